@@ -1,0 +1,183 @@
+"""One touch: what a tactile fingertip says, and what it cannot say.
+
+A contact gives position, outward normal, two principal directions and two curvatures. Which of
+the two directions is the meridian's and which the parallel's is *not* known: there is no field
+for it. Row i of `directions` has the curvature `curvatures[i]`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from estimator.vectors import Array, finite_array, frozen
+
+ORTHOGONALITY = 1e-6  # what exact arithmetic and a sensor driver keep; measured data: see below
+ROUNDING = float(np.deg2rad(3.0))  # what rounded printed vectors may be off
+
+
+@dataclass(frozen=True)
+class SensorNoise:
+    """Standard deviations of one reading; noise sits on the curvature tensor (sensor.md).
+
+    A reading is the body's 2x2 curvature tensor K plus a symmetric error, so the error of a
+    direction grows as 1/|kappa_1 - kappa_2| and an umbilic has no direction at all.
+
+    Args:
+        position: Each coordinate across the normal [m].
+        normal: Tilt of the normal about each tangent axis [rad].
+        direction: Rotation of the directions about the normal beyond the tensor's [rad].
+        deviator: Of K_xy, which equals that of (K_xx - K_yy)/2 [1/m].
+        mean_curvature: Of (K_xx + K_yy)/2 [1/m].
+        curvature_scale: Relative, common to both curvatures of a contact [-].
+        flat: Below this a curvature is reported as saturated (NaN) [1/m].
+        direction_offset: Rotation common to all readings of a session, about the normal [rad].
+    """
+
+    position: float
+    normal: float
+    direction: float
+    deviator: float
+    mean_curvature: float
+    curvature_scale: float
+    flat: float
+    direction_offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not (np.isfinite(value) and value >= 0.0):
+                raise ValueError(f"sensor noise {name}: expected a number >= 0, got {value}")
+        if min(self.position, self.normal) <= 0.0:
+            raise ValueError("sensor noise: position and normal must be greater than zero")
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """What one touch says, in the world frame.
+
+    Args:
+        position: On the surface [m], shape (3,).
+        normal: Unit, out of the object, shape (3,).
+        directions: The two principal directions as rows, unit, unsigned, in no order, (2, 3).
+        curvatures: The curvature along each row, convex positive [1/m], shape (2,). NaN where the
+            sensor saturates: flatter than it resolves.
+        noise: How far off all this may be.
+    Raises:
+        ValueError: Wrong shape, not finite, not unit, or normal and directions not orthogonal.
+    """
+
+    position: Array
+    normal: Array
+    directions: Array
+    curvatures: Array
+    noise: SensorNoise = field(repr=False)
+
+    def __post_init__(self) -> None:
+        position = finite_array("contact position", self.position, (3,))
+        normal = finite_array("contact normal", self.normal, (3,))
+        directions = finite_array("contact directions", self.directions, (2, 3))
+        curvatures = frozen(self.curvatures)
+        if curvatures.shape != (2,) or np.any(np.isinf(curvatures)):
+            raise ValueError(
+                f"contact curvatures: expected two numbers, NaN where saturated, got {curvatures}"
+            )
+        _require_frame(np.vstack([normal, directions]))
+        for name, value in (("position", position), ("normal", normal)):
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "directions", directions)
+        object.__setattr__(self, "curvatures", curvatures)
+
+    @property
+    def umbilicity(self) -> float:
+        """Half difference of the curvatures over its own noise: below 3 there is no direction."""
+        half = 0.5 * abs(np.subtract(*np.nan_to_num(self.curvatures)))
+        return float(np.inf if self.noise.deviator == 0.0 else half / self.noise.deviator)
+
+
+@dataclass(frozen=True, eq=False)
+class Miss:
+    """A finger went all the way along its approach and met nothing.
+
+    Args:
+        tip: Centre of the pad's sphere where the approach ended, world [m], shape (3,).
+        radius: Of the pad's sphere [m]: the object is farther than this from `tip`.
+    """
+
+    tip: Array
+    radius: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "tip", finite_array("miss tip", self.tip, (3,)))
+        if not (np.isfinite(self.radius) and self.radius >= 0.0):
+            raise ValueError(f"miss radius: expected a number >= 0, got {self.radius}")
+
+
+def measured_contact(
+    position: Array, normal: Array, directions: Array, curvatures: Array, noise: SensorNoise
+) -> Contact:
+    """A contact from measured, rounded vectors: normalised and made orthogonal, if nearly so.
+
+    The normal is kept; the directions give way, both alike (the nearest orthonormal pair in the
+    tangent plane).
+
+    Raises:
+        ValueError: A vector of length zero, or a pair more than 3 degrees from orthogonal.
+    """
+    vectors = np.vstack(
+        [
+            finite_array("normal", normal, (3,)),
+            finite_array("directions", directions, (2, 3)),
+        ]
+    )
+    names = ("normal", "directions[0]", "directions[1]")
+    lengths = np.linalg.norm(vectors, axis=1)
+    for name, length in zip(names, lengths, strict=True):
+        if not 0.9 <= length <= 1.1:
+            raise ValueError(f"{name}: expected a unit vector, its length is {length:.3g}")
+    frame = vectors / lengths[:, None]
+    for i, j in ((0, 1), (0, 2), (1, 2)):
+        off = abs(float(np.arcsin(np.clip(frame[i] @ frame[j], -1.0, 1.0))))
+        if off > ROUNDING:
+            raise ValueError(
+                f"{names[i]} and {names[j]}: {np.rad2deg(off):.1f} deg from orthogonal, "
+                f"rounding explains {np.rad2deg(ROUNDING):.0f} deg"
+            )
+    n = frame[0]
+    tangent = frame[1:] - np.outer(frame[1:] @ n, n)
+    left, _, right = np.linalg.svd(tangent, full_matrices=False)
+    return Contact(frozen(position), frozen(n), frozen(left @ right), curvatures, noise)
+
+
+def require_distinct(contacts: Sequence[Contact], *, minimum: int) -> None:
+    """Refuse too few contacts, and two contacts at one point.
+
+    Raises:
+        ValueError: Says how many there are, or which two coincide.
+    """
+    if len(contacts) < minimum:
+        raise ValueError(f"contacts: at least {minimum} are needed, got {len(contacts)}")
+    points = np.array([c.position for c in contacts])
+    gaps = np.linalg.norm(points[:, None] - points[None], axis=-1)
+    i, j = np.nonzero(np.triu(gaps < 1e-9, k=1))
+    if len(i):
+        raise ValueError(f"contacts {i[0] + 1} and {j[0] + 1} are at one point: touch elsewhere")
+
+
+def _require_frame(frame: Array) -> None:
+    """Rows normal, direction, direction: unit and orthogonal."""
+    error = np.abs(frame @ frame.T - np.eye(3))
+    if np.any(np.abs(np.linalg.norm(frame, axis=1) - 1.0) > ORTHOGONALITY):
+        raise ValueError(
+            "contact normal and directions: expected unit vectors, lengths are "
+            f"{np.linalg.norm(frame, axis=1).round(6).tolist()} "
+            "(rounded data: use measured_contact)"
+        )
+    if np.any(error > ORTHOGONALITY):
+        raise ValueError(
+            "contact normal and directions: expected orthogonal vectors, largest cosine "
+            f"{error.max():.2g} (rounded data: use measured_contact)"
+        )
+
+
