@@ -1,0 +1,231 @@
+"""Hands that feel: a Pinocchio model with pads on its fingertips, and a hand in a configuration.
+
+Frames: W world, B hand base (Pinocchio's universe), T fingertip (the link `Finger.tip_frame`).
+A pad is a sphere fixed in T with an outward normal through the middle of its sensitive patch. A
+pad that touches a smooth surface at p with outward surface normal n has its centre at
+p + pad_radius * n, and its normal within the sensor's cone about -n.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from hand_models.description import FingerDescription, HandError, known_hands, read_description
+from hand_models.urdf import read_urdf
+
+__all__ = ["Finger", "Hand", "HandError", "HandPose", "known_hands", "load_hand"]
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Finger:
+    """A finger and the pad on its tip.
+
+    Attributes:
+        name: E.g. "index".
+        joints: Names of the joints that move the tip, from base to tip.
+        q_indices: (J,) their indices into q, in the same order.
+        tip_frame: Name of the link that carries the pad; its frame is T.
+        tip_frame_id: Its index into `model.frames`.
+        pad_centre: (3,) centre of the pad's sphere, in T [m].
+        pad_normal: (3,) unit vector out of the pad, in T.
+        pad_radius: Radius of the pad's sphere [m].
+    """
+
+    name: str
+    joints: tuple[str, ...]
+    q_indices: IntArray
+    tip_frame: str
+    tip_frame_id: int
+    pad_centre: Array
+    pad_normal: Array
+    pad_radius: float
+
+
+@dataclass(frozen=True, eq=False)
+class Hand:
+    """A hand: kinematics, meshes, fingers. Made by `load_hand`.
+
+    Attributes:
+        name: Name in its description.
+        model: Pinocchio model with fixed base; its universe is the hand base frame B.
+        visual_model: Visual meshes on that model.
+        fingers: In the order of the description.
+        lower: (nq,) lower joint limits [rad], [m] for a prismatic joint.
+        upper: (nq,) upper joint limits, likewise.
+    """
+
+    name: str
+    model: pin.Model
+    visual_model: pin.GeometryModel
+    fingers: tuple[Finger, ...]
+    lower: Array
+    upper: Array
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Joint names in the order of q. This is Pinocchio's order, not that of the fingers."""
+        return tuple(self.model.names)[1:]
+
+    @cached_property
+    def middle(self) -> Array:
+        """(nq,) configuration in the middle of the limits; unlike q = 0 always within them."""
+        return _frozen((self.lower + self.upper) / 2)
+
+    def finger(self, name: str) -> Finger:
+        """The finger of that name.
+
+        Raises:
+            HandError: No such finger; lists those there are.
+        """
+        for finger in self.fingers:
+            if finger.name == name:
+                return finger
+        known = ", ".join(finger.name for finger in self.fingers)
+        raise HandError(f"{self.name} has no finger '{name}': its fingers are {known}")
+
+    def at(self, q: ArrayLike, X_WB: pin.SE3 | None = None) -> HandPose:
+        """Run the kinematics. Limits are not enforced: a posture may be asked about outside them.
+
+        Args:
+            q: (nq,) joint positions in the order of `joint_names` [rad], [m] if prismatic.
+            X_WB: Pose of the hand base in the world; the identity if not given.
+
+        Raises:
+            HandError: q has another shape, or is not finite.
+        """
+        q = _frozen(q)
+        if q.shape != (self.model.nq,) or not np.isfinite(q).all():
+            raise HandError(
+                f"{self.name}: q must be {self.model.nq} finite joint positions, got {q}"
+                f" of shape {q.shape}"
+            )
+        data = self.model.createData()
+        pin.computeJointJacobians(self.model, data, q)
+        pin.updateFramePlacements(self.model, data)
+        return HandPose(self, q, pin.SE3.Identity() if X_WB is None else pin.SE3(X_WB), data)
+
+
+@dataclass(frozen=True, eq=False)
+class HandPose:
+    """A hand in a configuration and a place; to hold one is to know that kinematics ran.
+
+    Made by `Hand.at`.
+
+    Attributes:
+        hand: The hand.
+        q: (nq,) joint positions.
+        X_WB: Pose of the hand base B in the world W.
+        data: Pinocchio data with joint and frame placements and joint Jacobians. Pinocchio's
+            world is B: `data.oMf[i]` is X_BF, not X_WF.
+    """
+
+    hand: Hand
+    q: Array
+    X_WB: pin.SE3
+    data: pin.Data
+
+    def transform_tip_to_world(self, finger: Finger) -> pin.SE3:
+        """X_WT, the pose of the finger's tip frame in the world."""
+        return self.X_WB * self.data.oMf[finger.tip_frame_id]
+
+    @cached_property
+    def pad_centres(self) -> Array:
+        """(F, 3) centres of the pads' spheres in the world, in the order of the fingers [m]."""
+        fingers = self.hand.fingers
+        return _frozen([self.transform_tip_to_world(f).act(f.pad_centre) for f in fingers])
+
+    @cached_property
+    def pad_normals(self) -> Array:
+        """(F, 3) unit vectors out of the pads in the world, in the order of the fingers."""
+        fingers = self.hand.fingers
+        return _frozen([self.transform_tip_to_world(f).rotation @ f.pad_normal for f in fingers])
+
+    def pad_jacobian(self, finger: Finger) -> Array:
+        """(3, nq) velocity of the pad's centre per joint velocity, world axes, base at rest."""
+        return self._pad_twist(finger)[:3]
+
+    def pad_turn_jacobian(self, finger: Finger) -> Array:
+        """(3, nq) angular velocity of the tip per joint velocity, world axes, base at rest.
+
+        The pad normal n moves with dn/dt = (J dq/dt) x n.
+        """
+        return self._pad_twist(finger)[3:]
+
+    def _pad_twist(self, finger: Finger) -> Array:
+        """(6, nq) velocity of the pad's centre above angular velocity of the tip, world axes."""
+        frame = self.hand.model.frames[finger.tip_frame_id]
+        X_JP = frame.placement * pin.SE3(np.eye(3), finger.pad_centre)  # pad in its joint's frame
+        J_B = pin.getFrameJacobian(
+            self.hand.model, self.data, frame.parentJoint, X_JP, pin.LOCAL_WORLD_ALIGNED
+        )
+        return _frozen(np.kron(np.eye(2), self.X_WB.rotation) @ J_B)
+
+
+def load_hand(name_or_path: str | Path) -> Hand:
+    """Load a known hand, or the hand of a TOML description.
+
+    Args:
+        name_or_path: One of `known_hands()`, or the path of a ".toml" description;
+            `hands/allegro_right.toml` explains its fields.
+
+    Raises:
+        HandError: Unknown hand; a description that is wrong or does not fit its URDF; a URDF with
+            joints that are not independent, limited, revolute or prismatic.
+    """
+    description = read_description(name_or_path)
+    model, visual_model = read_urdf(description)
+    return Hand(
+        name=description.name,
+        model=model,
+        visual_model=visual_model,
+        fingers=tuple(_finger(model, finger, description.name) for finger in description.fingers),
+        lower=_frozen(model.lowerPositionLimit),
+        upper=_frozen(model.upperPositionLimit),
+    )
+
+
+def _finger(model: pin.Model, description: FingerDescription, hand_name: str) -> Finger:
+    links = {f.name: i for i, f in enumerate(model.frames) if f.type == pin.FrameType.BODY}
+    if description.tip_frame not in links:
+        raise HandError(
+            f"{hand_name}: finger '{description.name}': the URDF has no link"
+            f" '{description.tip_frame}' for tip_frame; its links are {', '.join(links)}"
+        )
+    tip_frame_id = links[description.tip_frame]
+    supports = [int(j) for j in model.supports[model.frames[tip_frame_id].parentJoint] if j > 0]
+    if not supports:
+        raise HandError(
+            f"{hand_name}: finger '{description.name}': no joint moves tip_frame"
+            f" '{description.tip_frame}'"
+        )
+    return Finger(
+        name=description.name,
+        joints=tuple(model.names[j] for j in supports),
+        q_indices=_frozen_indices([model.joints[j].idx_q for j in supports]),
+        tip_frame=description.tip_frame,
+        tip_frame_id=tip_frame_id,
+        pad_centre=_frozen(description.pad_centre),
+        pad_normal=_frozen(description.pad_normal),
+        pad_radius=description.pad_radius,
+    )
+
+
+def _frozen(values: ArrayLike) -> Array:
+    array = np.array(values, dtype=np.float64)
+    array.setflags(write=False)
+    return array
+
+
+def _frozen_indices(values: list[int]) -> IntArray:
+    array = np.array(values, dtype=np.int64)
+    array.setflags(write=False)
+    return array
