@@ -78,31 +78,45 @@ def to_chart(reference: Axis, axis: Axis) -> Array:
 
     Degenerates at 90 degrees, where a line without a sign lies on both sides.
     """
-    u0, u = reference.direction, axis.direction
-    u = u if u @ u0 >= 0 else -u
-    basis = basis_across(u0)
-    sine = basis @ u
-    norm = float(np.linalg.norm(sine))
-    w = sine if norm < 1e-12 else sine * (np.arctan2(norm, u0 @ u) / norm)
-    carried = _rotate_basis(basis, u0, w)
-    return np.concatenate([carried @ (axis.foot(reference.point) - reference.point), w])
+    x = chart_coordinates(
+        reference.point, reference.direction, axis.point[None], axis.direction[None]
+    )
+    return np.asarray(x[0])
 
 
 def from_chart(reference: Axis, coordinates: ArrayLike) -> Axis:
     """The axis at the given chart coordinates: the inverse of `to_chart`."""
     x = finite_array("chart coordinates", coordinates, (4,))
-    u0 = reference.direction
+    points, directions = chart_lines(reference.point, reference.direction, x[None])
+    return Axis(points[0], directions[0])
+
+
+def chart_coordinates(origin: Array, u0: Array, points: Array, directions: Array) -> Array:
+    """Vectorised `to_chart`: lines (S, 3), (S, 3) to coordinates (S, 4)."""
+    u = directions * np.where(directions @ u0 >= 0, 1.0, -1.0)[:, None]
     basis = basis_across(u0)
-    angle = float(np.linalg.norm(x[2:]))
-    u = np.cos(angle) * u0 + np.sinc(angle / np.pi) * (x[2:] @ basis)
-    return Axis(reference.point + x[:2] @ _rotate_basis(basis, u0, x[2:]), u)
+    sine = u @ basis.T
+    norm = np.linalg.norm(sine, axis=1, keepdims=True)
+    angle = np.arctan2(norm, (u @ u0)[:, None])
+    w = sine * np.where(norm < 1e-12, 1.0, angle / np.maximum(norm, 1e-300))
+    gap = points - origin
+    foot = gap - np.sum(gap * u, axis=1, keepdims=True) * u
+    t = np.einsum("sjx,sx->sj", _carried_basis(basis, u0, w), foot)
+    return np.hstack([t, w])
 
 
-def _rotate_basis(basis: Array, u0: Array, w: Array) -> Array:
-    """Carry (e1, e2) along the smallest rotation of u0 by angle |w| towards w."""
-    angle = float(np.linalg.norm(w))
-    if angle == 0.0:
-        return basis
-    towards = w / angle
+def chart_lines(origin: Array, u0: Array, x: Array) -> tuple[Array, Array]:
+    """Vectorised `from_chart`: coordinates (S, 4) to points and unit directions (S, 3)."""
+    basis = basis_across(u0)
+    angle = np.linalg.norm(x[:, 2:], axis=1, keepdims=True)
+    u = np.cos(angle) * u0 + np.sinc(angle / np.pi) * (x[:, 2:] @ basis)
+    carried = _carried_basis(basis, u0, x[:, 2:])
+    return origin + np.einsum("sj,sjx->sx", x[:, :2], carried), u
+
+
+def _carried_basis(basis: Array, u0: Array, w: Array) -> Array:
+    """(e1, e2) carried along the smallest rotation of u0 by |w| towards w, (S, 2, 3)."""
+    angle = np.linalg.norm(w, axis=1)[:, None]
+    towards = np.where(angle > 0, w / np.maximum(angle, 1e-300), 0.0)
     turned = (np.cos(angle) - 1.0) * (towards @ basis) - np.sin(angle) * u0
-    return np.asarray(basis + np.multiply.outer(towards, turned))
+    return np.asarray(basis + towards[:, :, None] * turned[:, None, :])

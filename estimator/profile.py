@@ -112,7 +112,9 @@ class SplineProfile:
             )
         if np.any(r <= 0):
             bad = int(np.argmax(r <= 0))
-            raise ValueError(f"profile: radius must be positive, point {bad + 1} has r = {r[bad]:g}")
+            raise ValueError(
+                f"profile: radius must be positive, point {bad + 1} has r = {r[bad]:g}"
+            )
         object.__setattr__(self, "z", z)
         object.__setattr__(self, "r", r)
         object.__setattr__(self, "_spline", CubicSpline(z, r, bc_type="natural"))

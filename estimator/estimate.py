@@ -1,0 +1,87 @@
+"""What an estimate says: an axis, how sure, which others remain, and a verdict in words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from estimator.axis import Axis
+from estimator.vectors import Array
+
+Verdict = Literal["determined", "ambiguous", "undetermined"]
+
+CHI_95 = 2.4477  # radius of the 95 % disc of a plane Gaussian, in standard deviations
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """One axis that explains the touches.
+
+    Args:
+        axis: Its point is the chart's origin.
+        covariance: Of (t1, t2, w1, w2) in the chart at `axis` [m, m, rad, rad], (4, 4).
+        probability: Against the other hypotheses.
+        direction_offset: Common rotation of the directions about the normal at this axis [rad].
+        parallel_rows: For each contact the probability that row 0 is the parallel's, (n,).
+    """
+
+    axis: Axis
+    covariance: Array
+    probability: float
+    direction_offset: float
+    parallel_rows: Array
+
+    @property
+    def angle_95(self) -> float:
+        """The direction is off by no more than this with 95 % probability [rad]."""
+        return CHI_95 * float(np.sqrt(np.linalg.eigvalsh(self.covariance[2:, 2:])[-1]))
+
+    @property
+    def offset_95(self) -> float:
+        """The axis passes `axis.point` no farther than this with 95 % probability [m]."""
+        return CHI_95 * float(np.sqrt(np.linalg.eigvalsh(self.covariance[:2, :2])[-1]))
+
+
+@dataclass(frozen=True, eq=False)
+class AxisEstimate:
+    """The axis, with everything that must be known before it is trusted.
+
+    Args:
+        hypotheses: Distinct axes, likeliest first; probabilities sum to at most one.
+        labellings: For each labelling (row of each contact taken as the parallel's) its
+            probability, likeliest first, those below 1e-4 left out.
+        verdict: `determined`: one axis, every part of it fixed by the touches. `ambiguous`:
+            several axes fit. `undetermined`: some motion of the axis is free.
+        reasons: Why, in words.
+        p_value: How often a true surface of revolution would fit worse than this one.
+    """
+
+    hypotheses: tuple[Hypothesis, ...]
+    labellings: tuple[tuple[tuple[int, ...], float], ...]
+    verdict: Verdict
+    reasons: tuple[str, ...]
+    p_value: float
+
+    @property
+    def best(self) -> Hypothesis:
+        return self.hypotheses[0]
+
+    @property
+    def axis(self) -> Axis:
+        """The likeliest axis; its point is the foot of the contacts' (or prior's) middle."""
+        return self.best.axis
+
+    @property
+    def covariance(self) -> Array:
+        """Of the likeliest axis in the chart at itself (`estimator.axis`), (4, 4)."""
+        return self.best.covariance
+
+    @property
+    def angle_95(self) -> float:
+        return self.best.angle_95
+
+    @property
+    def offset_95(self) -> float:
+        return self.best.offset_95

@@ -1,0 +1,290 @@
+"""How well lines explain readings: cost, gradient and Fisher information, all at once.
+
+For a line (a, u) a contact at p lies at radius r = |u x (p - a)|, with e = u x (p - a) / r along
+its parallel and rad = e x u away from the axis. On a surface of revolution, exactly,
+
+    alpha = k_z . e = 0        the meridian direction lies in the meridian plane, eq. (24)
+    beta  = n . e = 0          and so does the normal, eq. (22)
+    gamma = kappa_theta - (n . rad) / r = 0                               eqs (2), (20)
+
+Position, slope and meridian curvature of the contact are unknowns of its own, so these three are
+all it says about the line. The error of the position turns e by sp/r, which makes alpha and beta
+correlated:
+
+    C = [[s_psi^2, 0], [0, s_n^2]] + (sp/r)^2 m m^T,   m = (k_z . rad, n . rad)
+
+and log det C belongs to the cost: without it a line through the contact, where r = 0, wins.
+A rotation delta of the directions about the normal, common to all contacts, is the fifth unknown.
+
+Arrays: S lines, n contacts, 2 labels (which row of `directions` is the parallel's), 5 parameters
+(t1, t2, w1, w2, delta) in the chart of `estimator.axis` at the line itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimator.contact import Contact
+from estimator.vectors import Array, Index, basis_across, unit
+
+UMBILIC = 3.0  # half difference of curvatures in its own sd, below which directions are void
+VOID_DIRECTION = 1e3  # sd [rad] that says nothing
+INSIDE = 0.05  # softness of "the axis lies behind the surface", on n . rad
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """Contacts as arrays with variances; a leading axis of length 1 or S."""
+
+    p: Array  # (., n, 3)
+    n: Array  # (., n, 3)
+    k: Array  # (., n, 2, 3)
+    kappa: Array  # (., n, 2)
+    var_p: Array  # (., n)
+    var_n: Array  # (., n)
+    var_psi: Array  # (., n)
+    var_kappa: Array  # (., n, 2)
+    var_offset: float
+    size: tuple[float, float] = (0.0, np.inf)  # mean and sd of the contacts' radius [m]
+
+    def take(self, index: Index) -> Readings:
+        """Rows of the leading axis, one for each line; nothing to do where all lines share."""
+        if len(self.p) == 1:
+            return self
+        p, n, k, kappa = (x[index] for x in (self.p, self.n, self.k, self.kappa))
+        noise = (self.var_p, self.var_n, self.var_psi, self.var_kappa)
+        var_p, var_n, var_psi, var_kappa = (x[index] for x in noise)
+        return Readings(
+            p, n, k, kappa, var_p, var_n, var_psi, var_kappa, self.var_offset, self.size
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """S lines with a common rotation of the directions: points (S, 3), units (S, 3), (S,)."""
+
+    a: Array
+    u: Array
+    delta: Array
+
+    def take(self, index: Index) -> Lines:
+        return Lines(self.a[index], self.u[index], self.delta[index])
+
+    def in_basis(self, v: Array) -> Array:
+        """Components (S, 2) of vectors (S, 3) across each line."""
+        return np.asarray(np.einsum("sjx,sx->sj", basis_across(self.u), v))
+
+    def moved(self, step: Array, origin: Array) -> Lines:
+        """Step (S, 5) in the chart; the point is then put at the foot of `origin`."""
+        basis = basis_across(self.u)
+        u = unit(self.u + np.einsum("sj,sjx->sx", step[:, 2:4], basis))
+        a = self.a + np.einsum("sj,sjx->sx", step[:, :2], basis)
+        return Lines(foot(a, u, origin), u, self.delta + step[:, 4])
+
+
+@dataclass(frozen=True, eq=False)
+class Terms:
+    """Negative log likelihood of each contact under each label, with derivatives."""
+
+    cost: Array  # (S, n, 2)
+    gradient: Array  # (S, n, 2, 5)
+    fisher: Array  # (S, n, 2, 5, 5)
+    chi_square: Array  # (S, n, 2): the part of twice the cost that is a sum of squares
+
+
+def foot(a: Array, u: Array, origin: Array) -> Array:
+    """Point of each line nearest to the origin, (S, 3)."""
+    return np.asarray(a + np.sum((origin - a) * u, axis=-1, keepdims=True) * u)
+
+
+def readings_of(contacts: Sequence[Contact]) -> Readings:
+    """Stack contacts, turning the noise of the curvature tensor into that of what is read."""
+    kappa_read = np.array([c.curvatures for c in contacts])
+    saturated = np.isnan(kappa_read)
+    kappa = np.where(saturated, 0.0, kappa_read)
+    noise = [c.noise for c in contacts]
+    deviator = np.array([s.deviator for s in noise])
+    half = 0.5 * np.abs(kappa[:, 0] - kappa[:, 1])
+    tensor = deviator / np.maximum(2.0 * half, 1e-12)
+    void = half <= UMBILIC * deviator
+    psi = np.where(void, VOID_DIRECTION, np.hypot(tensor, [s.direction for s in noise]))
+    mean = np.array([s.mean_curvature for s in noise])
+    scale = np.array([s.curvature_scale for s in noise])
+    flat = np.array([s.flat for s in noise])
+    var_kappa = (mean**2 + deviator**2)[:, None] + (scale[:, None] * kappa) ** 2
+    return Readings(
+        p=np.array([c.position for c in contacts])[None],
+        n=np.array([c.normal for c in contacts])[None],
+        k=np.array([c.directions for c in contacts])[None],
+        kappa=kappa[None],
+        var_p=np.array([s.position for s in noise])[None] ** 2,
+        var_n=np.array([s.normal for s in noise])[None] ** 2,
+        var_psi=np.maximum(psi, 1e-9)[None] ** 2,
+        var_kappa=np.where(saturated, flat[:, None] ** 2, var_kappa)[None],
+        var_offset=max(s.direction_offset for s in noise) ** 2,
+    )
+
+
+def evaluate(readings: Readings, lines: Lines) -> Terms:
+    """Cost of every contact under both labels at every line, with exact gradient.
+
+    The information is that of a Gaussian whose mean and covariance both depend on the line:
+    J^T C^-1 J + tr(C^-1 dC C^-1 dC)/2.
+    """
+    g = _geometry(readings, lines)
+    rotated, turned = _directions(readings, lines.delta)
+    k_z, dk_z = rotated[..., ::-1, :], turned[..., ::-1, :]  # label i: row i is the parallel's
+    alpha, d_alpha = _dot_e(k_z, g)
+    beta, d_beta = _dot_e(readings.n[..., None, :], g)
+    m_k, dm_k = _dot_rad(k_z, g)
+    m_n, dm_n = _dot_rad(readings.n[..., None, :], g)
+    d_alpha[..., 4] = np.einsum("...x,...x->...", dk_z, g.e[:, :, None])
+    dm_k[..., 4] = np.einsum("...x,...x->...", dk_z, g.rad[:, :, None])
+    beta, d_beta, m_n, dm_n = (np.repeat(x, 2, axis=2) for x in (beta, d_beta, m_n, dm_n))
+    plane = _plane_terms(
+        readings, g, np.stack([alpha, beta], -1), np.stack([d_alpha, d_beta], -1),
+        np.stack([m_k, m_n], -1), np.stack([dm_k, dm_n], -1),
+    )  # fmt: skip
+    bend = _curvature_terms(readings, g, m_n, dm_n)
+    parts = (plane, bend, _inside_terms(m_n, dm_n), _size_terms(readings, g))
+    return Terms(
+        cost=sum((x.cost for x in parts), np.zeros(())),
+        gradient=sum((x.gradient for x in parts), np.zeros(())),
+        fisher=sum((x.fisher for x in parts), np.zeros(())),
+        chi_square=plane.chi_square + bend.chi_square,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Geometry:
+    """Frame (rad, e, u) and radius of each contact about each line, and how they move.
+
+    de = c1 rad + c2 u,  drad = -c1 e - f u,  each of c1, c2, f, dr of shape (S, n, 5).
+    """
+
+    e: Array
+    rad: Array
+    u: Array
+    r: Array
+    c1: Array
+    c2: Array
+    f: Array
+    dr: Array
+
+
+def _geometry(readings: Readings, lines: Lines) -> _Geometry:
+    q = readings.p - lines.a[:, None]
+    u = np.broadcast_to(lines.u[:, None], q.shape)
+    v = np.cross(u, q)
+    r = np.maximum(np.linalg.norm(v, axis=-1), 1e-12)
+    e = v / r[..., None]
+    rad = np.cross(e, u)
+    E = basis_across(lines.u)  # (S, 2, 3)
+    dv = np.zeros((*q.shape[:2], 5, 3))
+    dv[:, :, 0], dv[:, :, 1] = -E[:, None, 1], E[:, None, 0]  # -u x E_j
+    dv[:, :, 2:4] = np.cross(E[:, None], q[:, :, None])
+    f = np.zeros((*q.shape[:2], 5))
+    f[..., 2:4] = np.einsum("sjx,snx->snj", E, rad)
+    return _Geometry(
+        e, rad, u, r,
+        c1=np.einsum("snjx,snx->snj", dv, rad) / r[..., None],
+        c2=np.einsum("snjx,snx->snj", dv, u) / r[..., None],
+        f=f,
+        dr=np.einsum("snjx,snx->snj", dv, e),
+    )  # fmt: skip
+
+
+def _directions(readings: Readings, delta: Array) -> tuple[Array, Array]:
+    """Directions turned back by delta about the normal, and their derivative, (S, n, 2, 3)."""
+    crossed = np.cross(readings.n[..., None, :], readings.k)
+    c, s = np.cos(delta)[:, None, None, None], np.sin(delta)[:, None, None, None]
+    return c * readings.k - s * crossed, -s * readings.k - c * crossed
+
+
+def _dot_e(x: Array, g: _Geometry) -> tuple[Array, Array]:
+    """x . e for x (., n, l, 3), and its derivative at constant x."""
+    value = np.einsum("...x,...x->...", x, g.e[:, :, None])
+    along_rad = np.einsum("...x,...x->...", x, g.rad[:, :, None])[..., None]
+    along_u = np.einsum("...x,...x->...", x, g.u[:, :, None])[..., None]
+    return value, along_rad * g.c1[:, :, None] + along_u * g.c2[:, :, None]
+
+
+def _dot_rad(x: Array, g: _Geometry) -> tuple[Array, Array]:
+    """x . rad for x (., n, l, 3), and its derivative at constant x."""
+    value = np.einsum("...x,...x->...", x, g.rad[:, :, None])
+    along_e = np.einsum("...x,...x->...", x, g.e[:, :, None])[..., None]
+    along_u = np.einsum("...x,...x->...", x, g.u[:, :, None])[..., None]
+    return value, -along_e * g.c1[:, :, None] - along_u * g.f[:, :, None]
+
+
+def _plane_terms(
+    readings: Readings, g: _Geometry, error: Array, d_error: Array, m: Array, dm: Array
+) -> Terms:
+    """alpha and beta with their joint covariance; error, m (S,n,2,2), derivatives (S,n,2,5,2)."""
+    tau = (readings.var_p / g.r**2)[:, :, None]
+    d_tau = -2.0 * tau[..., None] * (g.dr / g.r[..., None])[:, :, None]
+    base = np.stack([readings.var_psi, readings.var_n], -1)[:, :, None]
+    c_aa = base[..., 0] + tau * m[..., 0] ** 2
+    c_bb = base[..., 1] + tau * m[..., 1] ** 2
+    c_ab = tau * m[..., 0] * m[..., 1]
+    det = c_aa * c_bb - c_ab**2
+    inverse = np.stack([np.stack([c_bb, -c_ab], -1), np.stack([-c_ab, c_aa], -1)], -2)
+    inverse = inverse / det[..., None, None]
+    mm = m[..., None, :, None] * m[..., None, None, :]
+    cross = dm[..., :, :, None] * m[..., None, None, :]
+    d_c = d_tau[..., None, None] * mm
+    d_c = d_c + tau[..., None, None, None] * (cross + np.swapaxes(cross, -1, -2))
+    y = np.einsum("...ij,...j->...i", inverse, error)
+    chi_square = np.einsum("...i,...i->...", error, y)
+    whitened = np.einsum("...ij,...pjk->...pik", inverse, d_c)  # C^-1 dC
+    gradient = np.einsum("...pi,...i->...p", d_error, y)
+    gradient += 0.5 * np.einsum("...pii->...p", whitened)
+    gradient -= 0.5 * np.einsum("...i,...pij,...j->...p", y, d_c, y)
+    fisher = np.einsum("...pi,...ij,...qj->...pq", d_error, inverse, d_error)
+    fisher += 0.5 * np.einsum("...pij,...qji->...pq", whitened, whitened)
+    return Terms(0.5 * (chi_square + np.log(det)), gradient, fisher, chi_square)
+
+
+def _curvature_terms(readings: Readings, g: _Geometry, m_n: Array, dm_n: Array) -> Terms:
+    """gamma under each label: the row taken as the parallel must fit (n . rad) / r."""
+    r = g.r[:, :, None]
+    predicted = m_n / r
+    d_predicted = (dm_n - predicted[..., None] * g.dr[:, :, None]) / r[..., None]
+    gamma = (readings.kappa - predicted) / readings.var_kappa
+    chi_square = (readings.kappa - predicted) * gamma
+    weighted = d_predicted / readings.var_kappa[..., None]
+    return Terms(
+        0.5 * (chi_square + np.log(readings.var_kappa)),
+        -gamma[..., None] * d_predicted,
+        weighted[..., :, None] * d_predicted[..., None, :],
+        chi_square,
+    )
+
+
+def _inside_terms(m_n: Array, dm_n: Array) -> Terms:
+    """The axis lies behind every contact: n . rad = 1/sqrt(1 + r'^2) > 0, eq. (2)."""
+    short = np.maximum(-m_n, 0.0) / INSIDE
+    slope = np.where(m_n[..., None] < 0, dm_n, 0.0) / INSIDE
+    return Terms(
+        0.5 * short**2,
+        -short[..., None] * slope,
+        slope[..., :, None] * slope[..., None, :],
+        short**2,
+    )
+
+
+def _size_terms(readings: Readings, g: _Geometry) -> Terms:
+    """Radius of each contact against the believed size; n contacts weigh as much as one."""
+    mean, sd = readings.size
+    weight = 0.0 if np.isinf(sd) else 1.0 / (sd**2 * g.r.shape[1])
+    short = (g.r - mean)[:, :, None]
+    slope = g.dr[:, :, None]
+    return Terms(
+        0.5 * weight * short**2,
+        weight * short[..., None] * slope,
+        weight * slope[..., :, None] * slope[..., None, :],
+        np.zeros_like(short),
+    )
