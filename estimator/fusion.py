@@ -36,7 +36,7 @@ def estimate_axis(
     contact says.
 
     Args:
-        contacts: Two or more, in the world frame, at distinct points.
+        contacts: Two or more (with a prior any number), world frame, at distinct points.
         prior: What is believed of axis and size; without one the axis is expected within about
             two spreads of the contacts, any direction.
         misses: Where fingers met nothing; used only with a prior, which knows the size.
@@ -47,7 +47,7 @@ def estimate_axis(
     Raises:
         ValueError: Fewer than two contacts, or two at one point.
     """
-    require_distinct(contacts, minimum=2)
+    require_distinct(contacts, minimum=2 if prior is None else 0)
     posterior = posterior_of(contacts, prior=prior, misses=misses)
     peaks = find_peaks(posterior)
     probabilities = peak_probabilities(peaks)
@@ -79,14 +79,12 @@ def posterior_of(
     """The density over lines; its origin is the prior's point, or the contacts' centroid."""
     readings = readings_of(contacts)
     points = readings.p[0]
+    if prior is not None:
+        readings = replace(readings, size=(prior.radius, prior.radius_sd))
+        return Posterior(readings, prior.axis.point, prior.radius, prior, tuple(misses))
     centroid = points.mean(axis=0)
     spread = float(np.sqrt(np.mean(np.sum((points - centroid) ** 2, axis=1))))
-    if prior is None:
-        return Posterior(readings, centroid, max(spread, 1e-3))
-    readings = replace(readings, size=(prior.radius, prior.radius_sd))
-    return Posterior(
-        readings, prior.axis.point, max(spread, 0.5 * prior.radius), prior, tuple(misses)
-    )
+    return Posterior(readings, centroid, max(spread, 1e-3))
 
 
 def _hypotheses(peaks: list[Peak], probabilities: Array) -> tuple[Hypothesis, ...]:

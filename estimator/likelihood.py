@@ -28,7 +28,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimator.contact import Contact
-from estimator.vectors import Array, Index, basis_across, unit
+from estimator.vectors import Array, Index, basis_across, cross, unit
 
 UMBILIC = 3.0  # half difference of curvatures in its own sd, below which directions are void
 VOID_DIRECTION = 1e3  # sd [rad] that says nothing
@@ -102,7 +102,7 @@ def foot(a: Array, u: Array, origin: Array) -> Array:
 
 def readings_of(contacts: Sequence[Contact]) -> Readings:
     """Stack contacts, turning the noise of the curvature tensor into that of what is read."""
-    kappa_read = np.array([c.curvatures for c in contacts])
+    kappa_read = np.array([c.curvatures for c in contacts]).reshape(-1, 2)
     saturated = np.isnan(kappa_read)
     kappa = np.where(saturated, 0.0, kappa_read)
     noise = [c.noise for c in contacts]
@@ -116,15 +116,15 @@ def readings_of(contacts: Sequence[Contact]) -> Readings:
     flat = np.array([s.flat for s in noise])
     var_kappa = (mean**2 + deviator**2)[:, None] + (scale[:, None] * kappa) ** 2
     return Readings(
-        p=np.array([c.position for c in contacts])[None],
-        n=np.array([c.normal for c in contacts])[None],
-        k=np.array([c.directions for c in contacts])[None],
+        p=np.array([c.position for c in contacts]).reshape(1, -1, 3),
+        n=np.array([c.normal for c in contacts]).reshape(1, -1, 3),
+        k=np.array([c.directions for c in contacts]).reshape(1, -1, 2, 3),
         kappa=kappa[None],
         var_p=np.array([s.position for s in noise])[None] ** 2,
         var_n=np.array([s.normal for s in noise])[None] ** 2,
         var_psi=np.maximum(psi, 1e-9)[None] ** 2,
         var_kappa=np.where(saturated, flat[:, None] ** 2, var_kappa)[None],
-        var_offset=max(s.direction_offset for s in noise) ** 2,
+        var_offset=max((s.direction_offset for s in noise), default=0.0) ** 2,
     )
 
 
@@ -178,14 +178,14 @@ class _Geometry:
 def _geometry(readings: Readings, lines: Lines) -> _Geometry:
     q = readings.p - lines.a[:, None]
     u = np.broadcast_to(lines.u[:, None], q.shape)
-    v = np.cross(u, q)
+    v = cross(u, q)
     r = np.maximum(np.linalg.norm(v, axis=-1), 1e-12)
     e = v / r[..., None]
-    rad = np.cross(e, u)
+    rad = cross(e, u)
     E = basis_across(lines.u)  # (S, 2, 3)
     dv = np.zeros((*q.shape[:2], 5, 3))
     dv[:, :, 0], dv[:, :, 1] = -E[:, None, 1], E[:, None, 0]  # -u x E_j
-    dv[:, :, 2:4] = np.cross(E[:, None], q[:, :, None])
+    dv[:, :, 2:4] = cross(E[:, None], q[:, :, None])
     f = np.zeros((*q.shape[:2], 5))
     f[..., 2:4] = np.einsum("sjx,snx->snj", E, rad)
     return _Geometry(
@@ -199,7 +199,7 @@ def _geometry(readings: Readings, lines: Lines) -> _Geometry:
 
 def _directions(readings: Readings, delta: Array) -> tuple[Array, Array]:
     """Directions turned back by delta about the normal, and their derivative, (S, n, 2, 3)."""
-    crossed = np.cross(readings.n[..., None, :], readings.k)
+    crossed = cross(readings.n[..., None, :], readings.k)
     c, s = np.cos(delta)[:, None, None, None], np.sin(delta)[:, None, None, None]
     return c * readings.k - s * crossed, -s * readings.k - c * crossed
 
@@ -231,12 +231,12 @@ def _plane_terms(
     c_bb = base[..., 1] + tau * m[..., 1] ** 2
     c_ab = tau * m[..., 0] * m[..., 1]
     det = c_aa * c_bb - c_ab**2
-    inverse = np.stack([np.stack([c_bb, -c_ab], -1), np.stack([-c_ab, c_aa], -1)], -2)
-    inverse = inverse / det[..., None, None]
+    inverse = np.empty((*det.shape, 2, 2))
+    inverse[..., 0, 0], inverse[..., 1, 1] = c_bb / det, c_aa / det
+    inverse[..., 0, 1] = inverse[..., 1, 0] = -c_ab / det
     mm = m[..., None, :, None] * m[..., None, None, :]
-    cross = dm[..., :, :, None] * m[..., None, None, :]
-    d_c = d_tau[..., None, None] * mm
-    d_c = d_c + tau[..., None, None, None] * (cross + np.swapaxes(cross, -1, -2))
+    mixed = tau[..., None, None, None] * dm[..., :, :, None] * m[..., None, None, :]
+    d_c = d_tau[..., None, None] * mm + mixed + np.swapaxes(mixed, -1, -2)
     y = np.einsum("...ij,...j->...i", inverse, error)
     chi_square = np.einsum("...i,...i->...", error, y)
     whitened = np.einsum("...ij,...pjk->...pik", inverse, d_c)  # C^-1 dC

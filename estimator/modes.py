@@ -51,8 +51,10 @@ def find_peaks(posterior: Posterior) -> list[Peak]:
     a standard deviation are one.
     """
     start, labels = seeds(posterior.readings, posterior.origin, posterior.spread, posterior.prior)
-    lines, terms = climb(posterior, start, labels, iterations=25 if labels is not None else 40)
-    if labels is not None:
+    if labels is None:
+        lines, terms = climb(posterior, start)
+    else:
+        lines, terms = climb(posterior, start, labels, iterations=12, gain_at_rest=1e-3)
         chosen = _worth_keeping(terms.cost, 2.0 * DRAMATICALLY_WORSE)
         chosen = _distinct(lines, terms.fisher, chosen)
         lines, terms = climb(posterior, lines.take(chosen))

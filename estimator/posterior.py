@@ -88,7 +88,12 @@ def label_weights(terms: Terms) -> Array:
 
 
 def climb(
-    posterior: Posterior, start: Lines, labels: Index | None = None, *, iterations: int = 40
+    posterior: Posterior,
+    start: Lines,
+    labels: Index | None = None,
+    *,
+    iterations: int = 40,
+    gain_at_rest: float = 1e-7,
 ) -> tuple[Lines, LineTerms]:
     """Fisher scoring with Levenberg's damping, all starts at once.
 
@@ -112,7 +117,7 @@ def climb(
         lines = _replaced(lines, active[better], trial, better)
         terms = _replaced_terms(terms, active[better], found, better)
         damping[active] = np.where(better, 0.2, 8.0) * damping[active]
-        resting = (better & (gain < 1e-9)) | (damping[active] > 1e7)
+        resting = (better & (gain < gain_at_rest)) | (damping[active] > 1e7)
         active = active[~resting]
         if len(active) == 0:
             break

@@ -71,17 +71,16 @@ class LineTerms:
 def prior_terms(prior: AxisPrior, lines: Lines) -> LineTerms:
     """Gaussian in the prior's chart; the Jacobian between charts by central differences."""
 
-    def coordinates(x: Lines) -> Array:
-        return chart_coordinates(prior.axis.point, prior.axis.direction, x.a, x.u)
-
-    jacobian = np.zeros((len(lines.a), 4, 5))
-    h = 1e-6
-    for j in range(4):
-        step = np.zeros((len(lines.a), 5))
-        step[:, j] = h
-        ahead, behind = (coordinates(lines.moved(s * step, lines.a)) for s in (1, -1))
-        jacobian[:, :, j] = (ahead - behind) / (2 * h)
-    x = coordinates(lines)
+    h, S = 1e-6, len(lines.a)
+    steps = np.zeros((9, 5))
+    steps[1:5, :4], steps[5:, :4] = h * np.eye(4), -h * np.eye(4)
+    origin = prior.axis.point
+    moved = lines.take(np.tile(np.arange(S), 9)).moved(np.repeat(steps, S, axis=0), origin)
+    every = chart_coordinates(origin, prior.axis.direction, moved.a, moved.u)
+    x, ahead, behind = np.split(every.reshape(9, S, 4), [1, 5])
+    jacobian = np.zeros((S, 4, 5))
+    jacobian[:, :, :4] = np.moveaxis((ahead - behind) / (2 * h), 0, 2)
+    x = x[0]
     precision = np.linalg.inv(prior.covariance)
     y = x @ precision
     return LineTerms(

@@ -9,7 +9,7 @@ import numpy as np
 from estimator.likelihood import Lines, Readings, evaluate
 from estimator.posterior import label_weights
 from estimator.prior import AxisPrior
-from estimator.vectors import Array, Index, unit
+from estimator.vectors import Array, Index, cross, unit
 
 ENUMERATED = 4  # up to this many contacts every labelling gets starts of its own
 MOST_PAIRS = 45
@@ -28,10 +28,12 @@ def seeds(
     if n > ENUMERATED:
         pairs, _ = _pair_lines(readings, origin, list(_spread_pairs(n)))
         return _joined(pairs, general), None
-    pairs, pair_labels = _pair_lines(readings, origin, list(combinations(range(n), 2)))
-    lines, labels = _completed(pairs, pair_labels, n)
     weights = label_weights(evaluate(readings, general))
     likeliest = np.argmax(weights, axis=-1).astype(np.intp)
+    if n < 2:
+        return general, likeliest
+    pairs, pair_labels = _pair_lines(readings, origin, list(combinations(range(n), 2)))
+    lines, labels = _completed(pairs, pair_labels, n)
     return _joined(lines, general), np.vstack([labels, likeliest])
 
 
@@ -50,16 +52,16 @@ def _pair_lines(
     N1, N2 = readings.k[0, i, first], readings.k[0, j, second]
     d1 = np.sum(N1 * (readings.p[0, i] - origin), axis=1)
     d2 = np.sum(N2 * (readings.p[0, j] - origin), axis=1)
-    cross = np.cross(N1, N2)
-    sine = np.linalg.norm(cross, axis=1)
+    line = cross(N1, N2)
+    sine = np.linalg.norm(line, axis=1)
     kept = sine > 0.03  # nearly the same plane: no line, the general starts take over
-    system = np.stack([N1, N2, cross], axis=1)[kept]
+    system = np.stack([N1, N2, line], axis=1)[kept]
     rhs = np.stack([d1, d2, np.zeros_like(d1)], axis=1)[kept]
     a = np.linalg.solve(system, rhs[..., None])[..., 0] + origin
     labels = np.full((len(i), readings.p.shape[1]), -1, dtype=np.intp)
     rows = np.arange(len(i))
     labels[rows, i], labels[rows, j] = first, second
-    return Lines(a, unit(cross[kept]), np.zeros(int(kept.sum()))), labels[kept]
+    return Lines(a, unit(line[kept]), np.zeros(int(kept.sum()))), labels[kept]
 
 
 def _completed(lines: Lines, labels: Index, n: int) -> tuple[Lines, Index]:

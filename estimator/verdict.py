@@ -41,6 +41,8 @@ def judge(
     size: float,
 ) -> tuple[Verdict, tuple[str, ...]]:
     """The verdict and its reasons."""
+    if len(contacts) < 2:
+        return "undetermined", (f"{len(contacts)} contacts: two at least can fix an axis",)
     reasons = _coincidence_reasons(readings)
     for peak, probability in peaks:
         if probability > MENTIONED:
@@ -66,9 +68,7 @@ def free_motions(peak: Peak, size: float) -> list[FreeMotion]:
     values, vectors = np.linalg.eigh(schur * np.outer(units, units))
     sds = 1.0 / np.sqrt(np.maximum(values, 1e-12))
     return [
-        FreeMotion(vectors[:2, i], vectors[2:, i], float(sds[i]))
-        for i in range(4)
-        if sds[i] > FREE
+        FreeMotion(vectors[:2, i], vectors[2:, i], float(sds[i])) for i in range(4) if sds[i] > FREE
     ]
 
 
@@ -93,9 +93,7 @@ def _freedom_reasons(
     return [_motion_in_words(contacts, peak, motion, size) for motion in motions]
 
 
-def _motion_in_words(
-    contacts: list[Contact], peak: Peak, motion: FreeMotion, size: float
-) -> str:
+def _motion_in_words(contacts: list[Contact], peak: Peak, motion: FreeMotion, size: float) -> str:
     basis = basis_across(peak.direction)
     tilt = float(np.linalg.norm(motion.tilt))
     if tilt < 0.3:
@@ -106,8 +104,9 @@ def _motion_in_words(
     gaps = [np.linalg.norm(np.cross(c.position - point, about)) for c in contacts]
     near = [str(i + 1) for i, gap in enumerate(gaps) if gap < 0.15 * size]
     where = (
-        f"contacts {' and '.join(near)}" if len(near) >= 2 else f"{_millimetres(point)}, "
-        f"along {_direction(about)}"
+        f"contacts {' and '.join(near)}"
+        if len(near) >= 2
+        else f"{_millimetres(point)}, along {_direction(about)}"
     )
     amount = min(90.0, float(np.rad2deg(motion.sd * tilt)))
     return f"tilt about the line through {where} is free (sd {amount:.0f} deg from the touches)"

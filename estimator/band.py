@@ -1,0 +1,78 @@
+"""A profile that is only partly known: a Gaussian over splines, and what touches tell it.
+
+The profile is the natural cubic spline through nodes at fixed heights; the node radii have a mean
+and a covariance. Radius and slope at any height are linear in the nodes, so a touch conditions
+the band exactly (linear Gaussian), and the posterior has the prior's type.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from estimator.profile import SplineProfile
+from estimator.vectors import Array, frozen
+
+SLOPE_SD = 0.15  # of the profile as a whole [-]
+BULGE_SD = 0.10  # of its shape, over the radius [-]
+WAVELENGTH = 0.3  # of that shape, over the height [-]
+NODES = 15
+
+
+@dataclass(frozen=True, eq=False)
+class ProfileBand:
+    """Node heights z (k,) [m], mean radii (k,) [m] and their covariance (k, k) [m^2]."""
+
+    z: Array
+    mean: Array
+    covariance: Array
+
+    @property
+    def profile(self) -> SplineProfile:
+        """The mean, as a profile."""
+        return SplineProfile(self.z, np.maximum(self.mean, 0.2 * np.max(self.mean)))
+
+    @property
+    def sd(self) -> Array:
+        """Standard deviation of the radius at the nodes [m]."""
+        return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 0.0)))
+
+    def conditioned(
+        self, z: Array, r: Array, dr: Array, *, r_sd: Array, dr_sd: Array
+    ) -> ProfileBand:
+        """The band after radii r [m] and slopes dr [-] were found at heights z [m], all (m,).
+
+        Heights outside the nodes count at the nearest end.
+        """
+        spline = CubicSpline(self.z, np.eye(len(self.z)), bc_type="natural")
+        z = np.clip(z, self.z[0], self.z[-1])
+        H = np.vstack([spline(z), spline(z, 1)])
+        noise = np.diag(np.concatenate([r_sd, dr_sd]) ** 2)
+        gain = np.linalg.solve(H @ self.covariance @ H.T + noise, H @ self.covariance).T
+        mean = self.mean + gain @ (np.concatenate([r, dr]) - H @ self.mean)
+        covariance = self.covariance - gain @ H @ self.covariance
+        return ProfileBand(self.z, frozen(mean), frozen(0.5 * (covariance + covariance.T)))
+
+    def sample(self, count: int, *, rng: np.random.Generator) -> Array:
+        """Node radii drawn from the band, kept above a fifth of the mean, (count, k) [m]."""
+        drawn = rng.multivariate_normal(self.mean, self.covariance, size=count, method="eigh")
+        return np.maximum(drawn, 0.2 * np.max(self.mean))
+
+
+def coarse_band(radius: float, radius_sd: float, z_range: tuple[float, float]) -> ProfileBand:
+    """What a camera tells of the shape: a radius, roughly, over a range of heights.
+
+    Args:
+        radius, radius_sd: [m].
+        z_range: Lowest and highest z about the believed axis' point [m].
+    """
+    z = np.linspace(*z_range, NODES)
+    gap = (z[:, None] - z) / (WAVELENGTH * (z_range[1] - z_range[0]))
+    covariance = (
+        radius_sd**2
+        + SLOPE_SD**2 * np.outer(z - z.mean(), z - z.mean())
+        + (BULGE_SD * radius) ** 2 * np.exp(-0.5 * gap**2)
+    )
+    return ProfileBand(frozen(z), frozen(np.full(NODES, radius)), frozen(covariance))

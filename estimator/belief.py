@@ -1,0 +1,152 @@
+"""What is held true of the object, and how a touch changes it: the same type before and after."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimator.axis import Axis, chart_lines
+from estimator.band import ProfileBand, coarse_band
+from estimator.contact import Contact, Miss
+from estimator.estimate import AxisEstimate, Hypothesis
+from estimator.fusion import estimate_axis
+from estimator.prior import AxisPrior
+from estimator.surface import SurfaceOfRevolution
+from estimator.vectors import Array, frozen
+
+
+@dataclass(frozen=True, eq=False)
+class Belief:
+    """A mixture over axes, a profile with a band, and the touches so far.
+
+    Args:
+        prior: What was believed before any touch, e.g. by a camera.
+        hypotheses: Axes with covariance and probability, likeliest first.
+        band: The profile about the likeliest axis, z = 0 at that axis' point.
+        contacts, misses: Every touch so far; the estimate always rests on all of them.
+        estimate: What the estimator said of them, None before the first touch.
+    """
+
+    prior: AxisPrior
+    prior_band: ProfileBand
+    hypotheses: tuple[Hypothesis, ...]
+    band: ProfileBand
+    contacts: tuple[Contact, ...] = ()
+    misses: tuple[Miss, ...] = ()
+    estimate: AxisEstimate | None = None
+
+    @property
+    def axis(self) -> Axis:
+        return self.hypotheses[0].axis
+
+    @property
+    def covariance(self) -> Array:
+        """Of the likeliest axis, in the chart at itself."""
+        return self.hypotheses[0].covariance
+
+    @property
+    def surface(self) -> SurfaceOfRevolution:
+        """The best guess."""
+        return SurfaceOfRevolution(self.axis, self.band.profile)
+
+
+@dataclass(frozen=True, eq=False)
+class SampledObjects:
+    """Objects drawn from a belief: axis points and directions (B, 3), node radii (B, k)."""
+
+    points: Array
+    directions: Array
+    z: Array
+    radii: Array
+
+
+def coarse_belief(prior: AxisPrior, z_range: tuple[float, float]) -> Belief:
+    """A belief before any touch: an axis prior with a size, and a range of heights.
+
+    Args:
+        prior: Its axis' point is z = 0, its direction the sense of z.
+        z_range: Where the object's side is believed to begin and end [m].
+    Raises:
+        ValueError: The range is empty.
+    """
+    if not z_range[0] < z_range[1]:
+        raise ValueError(f"belief z_range: expected low < high, got {z_range}")
+    band = coarse_band(prior.radius, prior.radius_sd, z_range)
+    start = Hypothesis(prior.axis, prior.covariance, 1.0, 0.0, frozen(np.zeros(0)))
+    return Belief(prior, band, (start,), band)
+
+
+def update(belief: Belief, touches: Iterable[Contact | Miss]) -> Belief:
+    """The belief after more touches; a miss is news as well.
+
+    All touches are read together again from the prior, so one by one and all at once agree.
+    """
+    touches = tuple(touches)
+    contacts = belief.contacts + tuple(t for t in touches if isinstance(t, Contact))
+    misses = belief.misses + tuple(t for t in touches if isinstance(t, Miss))
+    estimate = estimate_axis(contacts, prior=belief.prior, misses=misses)
+    hypotheses = tuple(_with_sense(h, belief.prior.axis) for h in estimate.hypotheses)
+    band = _touched_band(belief.prior_band, hypotheses[0], contacts)
+    return replace(
+        belief,
+        hypotheses=hypotheses,
+        band=band,
+        contacts=contacts,
+        misses=misses,
+        estimate=estimate,
+    )
+
+
+def sample_objects(belief: Belief, count: int, *, rng: np.random.Generator) -> SampledObjects:
+    """Objects the belief holds possible: hypotheses by their probability, bands by their width."""
+    p = np.array([h.probability for h in belief.hypotheses])
+    which = rng.choice(len(p), size=count, p=p / p.sum())
+    points, directions = np.empty((count, 3)), np.empty((count, 3))
+    for i, hypothesis in enumerate(belief.hypotheses):
+        mine = np.nonzero(which == i)[0]
+        x = rng.multivariate_normal(np.zeros(4), hypothesis.covariance, size=len(mine))
+        axis = hypothesis.axis
+        points[mine], directions[mine] = chart_lines(axis.point, axis.direction, x)
+    return SampledObjects(points, directions, belief.band.z, belief.band.sample(count, rng=rng))
+
+
+def _with_sense(hypothesis: Hypothesis, reference: Axis) -> Hypothesis:
+    """The hypothesis with its direction on the prior's side; the chart's basis turns along."""
+    if hypothesis.axis.direction @ reference.direction >= 0:
+        return hypothesis
+    flip = _chart_flip(hypothesis.axis)
+    axis = Axis(hypothesis.axis.point, -hypothesis.axis.direction)
+    covariance = frozen(flip @ hypothesis.covariance @ flip.T)
+    return replace(hypothesis, axis=axis, covariance=covariance)
+
+
+def _chart_flip(axis: Axis) -> Array:
+    """Coordinates in the chart at (point, -u) of those in the chart at (point, u).
+
+    `basis_across` gives (e1, e2) at u and (e1, -e2) at -u. A tilt w of u is -w of -u as a change
+    of components along the same vectors.
+    """
+    return np.diag([1.0, -1.0, -1.0, 1.0])
+
+
+def _touched_band(
+    band: ProfileBand, hypothesis: Hypothesis, contacts: tuple[Contact, ...]
+) -> ProfileBand:
+    """Radius and slope of every contact about the likeliest axis, eqs (1), (2)."""
+    if not contacts:
+        return band
+    axis = hypothesis.axis
+    p = np.array([c.position for c in contacts])
+    n = np.array([c.normal for c in contacts])
+    z = (p - axis.point) @ axis.direction
+    away = p - axis.foot(p)
+    r = np.linalg.norm(away, axis=1)
+    rad = away / r[:, None]
+    dr = -(n @ axis.direction) / np.maximum(np.sum(n * rad, axis=1), 0.1)  # (2): n ~ rad - r' u
+    sd = np.sqrt(np.diag(hypothesis.covariance))
+    noise = [c.noise for c in contacts]
+    r_sd = np.hypot([s.position for s in noise], np.hypot(sd[0], sd[1]))
+    dr_sd = (1.0 + dr**2) * np.hypot([s.normal for s in noise], np.hypot(sd[2], sd[3]))
+    return band.conditioned(z, r, dr, r_sd=r_sd, dr_sd=dr_sd)
