@@ -59,7 +59,7 @@ def symbolic_frames(model: pin.Model, frame_names: Sequence[str]) -> ca.Function
 
     Args:
         model: As for `symbolic_joint_placements`.
-        frame_names: Names of frames of the model, at least one.
+        frame_names: Names of frames of the model; of a link and a joint of one name, the link.
 
     Raises:
         HandError: No such frame; lists those there are.
@@ -101,8 +101,8 @@ def _frame_id(model: pin.Model, name: str) -> int:
     if not ids:
         known = ", ".join(frame.name for frame in model.frames)
         raise HandError(f"the model has no frame '{name}'; its frames are {known}")
-    # A URDF may name a link like its joint. They coincide then, unless a fixed joint is between.
-    return ids[-1]
+    links = [i for i in ids if model.frames[i].type == pin.FrameType.BODY]
+    return (links or ids)[0]
 
 
 def _joint_motion(joint: pin.JointModel, q: ca.SX, name: str) -> Placement:
