@@ -1,0 +1,206 @@
+"""The world for rehearsal: a true object at its true pose, and fingertips that really touch it.
+
+A pad is a sphere that moves along its planned approach and stops where it first meets the solid:
+the wall, a flat cap or the rim between them. Where the plan thought it would touch plays no part.
+
+Conventions
+    A cap is flat: both curvatures zero, directions without meaning.
+    A rim is a fillet of radius `EDGE_RADIUS`: along the parallel it curves as the normal says
+    (Meusnier), across it 1/EDGE_RADIUS. So an edge gives a true normal and true directions, and a
+    curvature no wall of this size has.
+    A path that starts inside the object had too short a stand-off: the finger would have touched
+    on its way there. It is taken back along its first step until it is free and touches from
+    there; `TouchRecord.overlap` says by how much, and `stop` is 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from estimator.contact import Contact, Miss
+from estimator.surface import Geometry, SurfaceOfRevolution
+from estimator.vectors import Array, basis_across, frozen, unit
+from sim_sensor.noise import Session, Site
+from sim_sensor.solid import NearestPlace, Part, Solid
+
+EDGE_RADIUS = 0.5e-3  # fillet of a rim [m]
+TOUCHING = 1e-10  # how far along the path a touch is known [m]
+
+
+class TouchPath(Protocol):
+    """What the world needs of an approach."""
+
+    @property
+    def tip_centres(self) -> Array:
+        """Centres of the pad's sphere in the world, in order, straight in between, (K, 3) [m]."""
+
+    @property
+    def pad_radius(self) -> float:
+        """Radius of the pad's sphere [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class TouchRecord:
+    """What really happened in one touch: for the viewer and the result file, not for a planner.
+
+    Args:
+        outcome: What the sensor said, or that the path met nothing.
+        tip: Centre of the pad's sphere where it stopped, world [m], shape (3,).
+        stop: Where on the path, counted in its points with fractions, in [0, K - 1].
+        truth: Exact geometry at the touched place; None after a miss.
+        part: The part of the object that was touched; None after a miss.
+        overlap: How deep the path started in the object [m]; 0 as it should be.
+    """
+
+    outcome: Contact | Miss
+    tip: Array
+    stop: float
+    truth: Geometry | None = None
+    part: Part | None = None
+    overlap: float = 0.0
+
+
+class World:
+    """A true object, felt by one mounted sensor.
+
+    Args:
+        surface: The object at its pose; its ends are flat caps.
+        session: The mounted sensor.
+        rng: For the readings.
+    """
+
+    def __init__(
+        self, surface: SurfaceOfRevolution, session: Session, *, rng: np.random.Generator
+    ) -> None:
+        self.surface = surface
+        self._session = session
+        self._rng = rng
+        self._solid = Solid(surface.profile)
+        self._records: list[TouchRecord] = []
+
+    @property
+    def records(self) -> tuple[TouchRecord, ...]:
+        """What happened so far, in order."""
+        return tuple(self._records)
+
+    def signed_distance(self, point_W: Array) -> float:
+        """True distance of a point to the object, negative inside [m]."""
+        return self._nearest(point_W).distance
+
+    def touch(self, path: TouchPath, *, site: Site | None = None) -> Contact | Miss:
+        """Move the pad along the path until it meets the object, and feel.
+
+        Args:
+            path: The approach.
+            site: Offsets shared with earlier readings at this place (`Session.new_site`).
+        Raises:
+            ValueError: Not a path: fewer than two points, none that differ, wrong shape, not
+                finite, or a radius that is not positive.
+        """
+        centres, radius = _checked(path)
+        overlap = radius - self.signed_distance(centres[0])
+        route = np.vstack([self._free_start(centres, radius), centres]) if overlap > 0 else centres
+        stop = first_touch(route, lambda point: self.signed_distance(point) - radius)
+        if stop is None:
+            record = TouchRecord(Miss(centres[-1], radius), frozen(centres[-1]), len(centres) - 1.0)
+        else:
+            record = self._felt(_along(route, stop), site, stop, max(overlap, 0.0))
+        self._records.append(record)
+        return record.outcome
+
+    def _felt(self, tip: Array, site: Site | None, stop: float, overlap: float) -> TouchRecord:
+        """The touch of a pad whose centre stopped at `tip`."""
+        truth, part = self._geometry(tip)
+        contact = self._session.read(truth, rng=self._rng, site=site)
+        if overlap > 0:
+            stop = max(stop - 1.0, 0.0)  # the route has one point before the path
+        return TouchRecord(contact, frozen(tip), stop, truth, part, overlap)
+
+    def _geometry(self, tip: Array) -> tuple[Geometry, Part]:
+        """Exact geometry at the place nearest to the pad's centre."""
+        place = self._nearest(tip)
+        x, y, u = self.surface.frame
+        theta = np.array(self.surface.place_of(tip).theta)
+        if place.part is Part.WALL:
+            return self.surface.at(theta, np.array(place.z)), place.part
+        out = np.cos(theta) * x + np.sin(theta) * y
+        p = self.surface.axis.point + place.rho * out + place.z * u
+        if place.part is Part.RIM:
+            n = unit(tip - p)
+            k_theta = np.cross(u, out)
+            kappa_theta = n @ out / place.rho
+            return _geometry(p, n, k_theta, kappa_theta, 1.0 / EDGE_RADIUS), place.part
+        n = u if place.z > np.mean(self.surface.profile.z_range) else -u
+        return _geometry(p, n, basis_across(n)[0], 0.0, 0.0), place.part
+
+    def _nearest(self, point_W: Array) -> NearestPlace:
+        x, y, z = self.surface.frame @ (point_W - self.surface.axis.point)
+        return self._solid.nearest(float(np.hypot(x, y)), float(z))
+
+    def _free_start(self, centres: Array, radius: float) -> Array:
+        """A point behind the path's start where the pad is clear of the object."""
+        steps = np.diff(centres, axis=0)
+        first = steps[np.argmax(np.linalg.norm(steps, axis=1) > TOUCHING)]
+        low, high = self.surface.profile.z_range
+        reach = 2.0 * self._solid.largest_radius + (high - low) + 2.0 * radius
+        return np.asarray(centres[0] - reach * unit(first))
+
+
+def first_touch(route: Array, clearance: Callable[[Array], float]) -> float | None:
+    """Where along a polyline the clearance first vanishes, in points with fractions.
+
+    Clearance cannot change faster than the pad moves, so an interval whose end clearances add up
+    to more than its length is free. What is left is halved, the earlier half first.
+
+    Args:
+        route: Points of the polyline, shape (K, 3) [m].
+        clearance: Of a pad centred at a point [m]; changes at most as fast as the point moves.
+    Returns:
+        To within `TOUCHING` of path length; None where the polyline ends clear.
+    """
+    gaps = [clearance(point) for point in route]
+    open_intervals = [(float(i), gaps[i], i + 1.0, gaps[i + 1]) for i in range(len(route) - 1)][
+        ::-1
+    ]
+    while open_intervals:
+        a, gap_a, b, gap_b = open_intervals.pop()
+        if gap_a <= 0:
+            return a
+        length = float(np.linalg.norm(_along(route, b) - _along(route, a)))
+        if gap_b > 0 and gap_a + gap_b > length:
+            continue
+        if length <= TOUCHING:
+            return b
+        middle = 0.5 * (a + b)
+        gap = clearance(_along(route, middle))
+        open_intervals += [(middle, gap, b, gap_b), (a, gap_a, middle, gap)]
+    return None
+
+
+def _geometry(p: Array, n: Array, k_theta: Array, kappa_theta: float, kappa_z: float) -> Geometry:
+    """Geometry with the meridian's direction completed: k_theta x k_z = n."""
+    return Geometry(p, n, k_theta, np.cross(n, k_theta), np.array(kappa_theta), np.array(kappa_z))
+
+
+def _along(route: Array, at: float) -> Array:
+    """The point of a polyline at a place counted in its points."""
+    i = min(int(at), len(route) - 2)
+    return np.asarray(route[i] + (at - i) * (route[i + 1] - route[i]))
+
+
+def _checked(path: TouchPath) -> tuple[Array, float]:
+    """The path's centres and radius, if they are a path."""
+    centres = np.asarray(path.tip_centres, dtype=np.float64)
+    if centres.ndim != 2 or centres.shape[1] != 3 or len(centres) < 2:
+        raise ValueError(f"tip_centres: expected shape (K, 3) with K >= 2, got {centres.shape}")
+    if not np.all(np.isfinite(centres)):
+        raise ValueError("tip_centres: expected finite numbers")
+    if np.ptp(centres, axis=0).max() <= TOUCHING:
+        raise ValueError("tip_centres: all points are the same, a touch needs a way to move")
+    if not (np.isfinite(path.pad_radius) and path.pad_radius > 0):
+        raise ValueError(f"pad_radius: expected a length > 0, got {path.pad_radius}")
+    return centres, float(path.pad_radius)
