@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from estimator.axis import Axis
+from estimator.planes import Labelling
 from estimator.vectors import Array
 
 Verdict = Literal["determined", "ambiguous", "undetermined"]
@@ -50,8 +51,8 @@ class AxisEstimate:
 
     Args:
         hypotheses: Distinct axes, likeliest first; probabilities sum to at most one.
-        labellings: For each labelling (row of each contact taken as the parallel's) its
-            probability, likeliest first, those below 1e-4 left out.
+        labellings: Each labelling with its probability, likeliest first, those below 1e-4
+            left out.
         verdict: `determined`: one axis, every part of it fixed by the touches. `ambiguous`:
             several axes fit. `undetermined`: some motion of the axis is free.
         reasons: Why, in words.
@@ -59,7 +60,7 @@ class AxisEstimate:
     """
 
     hypotheses: tuple[Hypothesis, ...]
-    labellings: tuple[tuple[tuple[int, ...], float], ...]
+    labellings: tuple[tuple[Labelling, float], ...]
     verdict: Verdict
     reasons: tuple[str, ...]
     p_value: float

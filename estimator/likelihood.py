@@ -27,7 +27,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.contact import Contact
+from estimator.contact import Contact, SensorNoise
+from estimator.surface import Geometry
 from estimator.vectors import Array, Index, basis_across, cross, unit
 
 UMBILIC = 3.0  # half difference of curvatures in its own sd, below which directions are void
@@ -102,28 +103,55 @@ def foot(a: Array, u: Array, origin: Array) -> Array:
 
 def readings_of(contacts: Sequence[Contact]) -> Readings:
     """Stack contacts, turning the noise of the curvature tensor into that of what is read."""
-    kappa_read = np.array([c.curvatures for c in contacts]).reshape(-1, 2)
+    kappa = np.array([c.curvatures for c in contacts]).reshape(1, -1, 2)
+    return stacked_readings(
+        np.array([c.position for c in contacts]).reshape(1, -1, 3),
+        np.array([c.normal for c in contacts]).reshape(1, -1, 3),
+        np.array([c.directions for c in contacts]).reshape(1, -1, 2, 3),
+        kappa,
+        [c.noise for c in contacts],
+    )
+
+
+def exact_readings(geometry: Geometry, noise: SensorNoise) -> Readings:
+    """Noise-free readings of places (B, n), row 0 the parallel's: what a planner expects."""
+    n = geometry.p.shape[1]
+    return stacked_readings(
+        geometry.p,
+        geometry.n,
+        np.stack([geometry.k_theta, geometry.k_z], axis=-2),
+        np.stack([geometry.kappa_theta, geometry.kappa_z], axis=-1),
+        [noise] * n,
+    )
+
+
+def stacked_readings(
+    p: Array, n: Array, k: Array, kappa_read: Array, noise: Sequence[SensorNoise]
+) -> Readings:
+    """Readings from arrays (., n, ...) with NaN where a curvature saturated."""
+
+    def column(name: str) -> Array:
+        return np.array([getattr(s, name) for s in noise], dtype=np.float64)
+
     saturated = np.isnan(kappa_read)
     kappa = np.where(saturated, 0.0, kappa_read)
-    noise = [c.noise for c in contacts]
-    deviator = np.array([s.deviator for s in noise])
-    half = 0.5 * np.abs(kappa[:, 0] - kappa[:, 1])
-    tensor = deviator / np.maximum(2.0 * half, 1e-12)
+    deviator = column("deviator")
+    half = 0.5 * np.abs(kappa[..., 0] - kappa[..., 1])
     void = half <= UMBILIC * deviator
-    psi = np.where(void, VOID_DIRECTION, np.hypot(tensor, [s.direction for s in noise]))
-    mean = np.array([s.mean_curvature for s in noise])
-    scale = np.array([s.curvature_scale for s in noise])
-    flat = np.array([s.flat for s in noise])
-    var_kappa = (mean**2 + deviator**2)[:, None] + (scale[:, None] * kappa) ** 2
+    psi = np.hypot(deviator / np.maximum(2.0 * half, 1e-12), column("direction"))
+    psi = np.where(void, VOID_DIRECTION, np.maximum(psi, 1e-9))
+    even = (column("mean_curvature") ** 2 + deviator**2)[:, None]
+    var_kappa = even + (column("curvature_scale")[:, None] * kappa) ** 2
+    whole = np.ones_like(half)
     return Readings(
-        p=np.array([c.position for c in contacts]).reshape(1, -1, 3),
-        n=np.array([c.normal for c in contacts]).reshape(1, -1, 3),
-        k=np.array([c.directions for c in contacts]).reshape(1, -1, 2, 3),
-        kappa=kappa[None],
-        var_p=np.array([s.position for s in noise])[None] ** 2,
-        var_n=np.array([s.normal for s in noise])[None] ** 2,
-        var_psi=np.maximum(psi, 1e-9)[None] ** 2,
-        var_kappa=np.where(saturated, flat[:, None] ** 2, var_kappa)[None],
+        p=p,
+        n=n,
+        k=k,
+        kappa=kappa,
+        var_p=whole * column("position") ** 2,
+        var_n=whole * column("normal") ** 2,
+        var_psi=psi**2,
+        var_kappa=np.where(saturated, column("flat")[:, None] ** 2, var_kappa),
         var_offset=max((s.direction_offset for s in noise), default=0.0) ** 2,
     )
 

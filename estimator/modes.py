@@ -9,6 +9,7 @@ import numpy as np
 
 from estimator.axis import chart_coordinates
 from estimator.likelihood import Lines, evaluate
+from estimator.planes import Labelling
 from estimator.posterior import Posterior, climb, label_weights
 from estimator.seeds import seeds
 from estimator.vectors import Array, Index
@@ -118,17 +119,14 @@ def peak_probabilities(peaks: list[Peak]) -> Array:
 
 def labelling_probabilities(
     peaks: list[Peak], probabilities: Array
-) -> tuple[tuple[tuple[int, ...], float], ...]:
-    """Every labelling with its probability, likeliest first; those below 1e-4 left out.
-
-    A labelling holds, for each contact, the row of `directions` taken as the parallel's.
-    """
+) -> tuple[tuple[Labelling, float], ...]:
+    """Every labelling with its probability, likeliest first; those below 1e-4 left out."""
     total: dict[tuple[int, ...], float] = {}
     for peak, probability in zip(peaks, probabilities, strict=True):
         for labels, given in _labellings_at(peak.label_weights):
             total[labels] = total.get(labels, 0.0) + given * float(probability)
     ranked = sorted(total.items(), key=lambda item: -item[1])
-    return tuple(item for item in ranked if item[1] >= 1e-4)
+    return tuple((Labelling(rows), p) for rows, p in ranked if rows and p >= 1e-4)
 
 
 def _labellings_at(weights: Array) -> list[tuple[tuple[int, ...], float]]:

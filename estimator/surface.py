@@ -95,8 +95,14 @@ class SurfaceOfRevolution:
 
     def place_of(self, point_W: Array) -> Place:
         """Meridian angle and height of a point; on the axis the angle is meaningless."""
-        x, y, z = self.frame @ (point_W - self.axis.point)
-        return Place(float(np.arctan2(y, x)), float(z))
+        theta, _, z = self.cylindrical(point_W)
+        return Place(float(theta), float(z))
+
+    def cylindrical(self, points_W: Array) -> tuple[Array, Array, Array]:
+        """Meridian angle [rad], distance from the axis [m] and height [m] of points (..., 3)."""
+        local = (points_W - self.axis.point) @ self.frame.T
+        x, y = local[..., 0], local[..., 1]
+        return np.arctan2(y, x), np.hypot(x, y), local[..., 2]
 
     def signed_distance(self, points_W: Array) -> Array:
         """First-order distance to the solid, negative inside, flat caps at both ends [m].
@@ -104,8 +110,7 @@ class SurfaceOfRevolution:
         (rho - r)/sqrt(1 + r'^2) beside the wall, the usual corner rule at the rims. Exact on
         cylinder and cone walls; elsewhere its zero set is exact and its slope is one there.
         """
-        local = (points_W - self.axis.point) @ self.frame.T
-        rho, z = np.hypot(local[..., 0], local[..., 1]), local[..., 2]
+        _, rho, z = self.cylindrical(points_W)
         low, high = self.profile.z_range
         r, dr, _ = self.profile.derivatives(np.clip(z, low, high))
         wall = (rho - r) / np.sqrt(1.0 + dr**2)

@@ -63,9 +63,15 @@ def batch_placements(hand: Hand, q: Array) -> BatchPlacements:
 
 def _screw(hand: Hand, joint: int, angle: Array) -> tuple[Array, Array]:
     """Rotation (N, 3, 3), by Rodrigues' formula, and translation (N, 3) of one joint's motion."""
-    data = hand.model.joints[joint].createData()
-    hand.model.joints[joint].calc(data, np.zeros(1))
-    v, w = np.split(np.asarray(data.S).ravel(), 2)
+    v, w = joint_screw(hand, joint)
     K = np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
     s, c = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
     return np.eye(3) + s * K + (1.0 - c) * (K @ K), angle[:, None] * v
+
+
+def joint_screw(hand: Hand, joint: int) -> tuple[Array, Array]:
+    """Linear (3,) and angular (3,) velocity of a joint in its own frame, per unit velocity."""
+    data = hand.model.joints[joint].createData()
+    hand.model.joints[joint].calc(data, np.zeros(1))
+    v, w = np.split(np.asarray(data.S, dtype=np.float64).ravel(), 2)
+    return v, w

@@ -1,0 +1,218 @@
+"""Contacts this hand can really make: postures of the hand laid onto the believed surface.
+
+Idea: a posture fixes where the pads are relative to each other. Laying it onto the surface leaves
+the six coordinates of the hand's base, which are found for thousands of postures at once: pads on
+the surface, pad normals against it, heights inside the object. What comes out is a set of contact
+triples with the joint angles and the base pose that nearly make them; `reach` makes them exact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+import pinocchio as pin
+
+from estimator.surface import SurfaceOfRevolution
+from estimator.vectors import Array, Index, Mask, unit
+from hand_models.batch import batch_placements
+from hand_models.hand import Hand
+from hand_models.postures import Postures
+from hand_models.spheres import LinkSpheres
+from planner.laying import Laid, lay
+from planner.workspace import Workspace
+
+END_MARGIN = 0.08  # of the believed height, kept from both ends
+GAP = 2e-3  # of a laid pad from the surface that reach will close [m]
+INTRUSION = 4e-3  # of a link sphere into the believed object that reach will remove [m]
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """N placements of the hand with m fingers on the believed surface.
+
+    Args:
+        fingers: Which of the hand's fingers touch, (N, m).
+        q: Joint positions, (N, nq).
+        R_WB, p_WB: Pose of the hand base, (N, 3, 3), (N, 3) [m].
+        theta, z: Places on the believed surface, (N, m) [rad], [m].
+        pad_angle: Between pad normal and inward surface normal, (N, m) [rad].
+        rejected: How many placements fell, by reason, in order.
+    """
+
+    fingers: Index
+    q: Array
+    R_WB: Array
+    p_WB: Array
+    theta: Array
+    z: Array
+    pad_angle: Array
+    rejected: tuple[tuple[str, int], ...]
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+    def take(self, index: Index) -> Candidates:
+        return Candidates(
+            self.fingers[index],
+            self.q[index],
+            self.R_WB[index],
+            self.p_WB[index],
+            self.theta[index],
+            self.z[index],
+            self.pad_angle[index],
+            self.rejected,
+        )
+
+    def base(self, i: int) -> pin.SE3:
+        return pin.SE3(self.R_WB[i], self.p_WB[i])
+
+
+def placement_candidates(
+    hand: Hand,
+    postures: Postures,
+    spheres: LinkSpheres,
+    surface: SurfaceOfRevolution,
+    *,
+    cone: float,
+    count: int,
+    rng: np.random.Generator,
+    workspace: Workspace | None = None,
+    fingers_at_once: int = 3,
+) -> Candidates:
+    """Placements with several fingers on the surface at once.
+
+    Args:
+        cone: Largest angle between pad normal and inward surface normal [rad].
+        count: How many postures are laid on.
+        fingers_at_once: Contacts per placement, at most the hand's fingers.
+        workspace: Where the hand's base may be; free where None.
+    """
+    ways = np.array(list(combinations(range(len(hand.fingers)), fingers_at_once)), dtype=np.intp)
+    fingers = ways[rng.integers(len(ways), size=count)]
+    chosen = rng.choice(len(postures), size=count, replace=count > len(postures))
+    laid = lay(hand, surface, postures.q[chosen], fingers, cone=cone, rng=rng)
+    return _kept(hand, fingers, spheres, surface, laid, cone, workspace or Workspace())
+
+
+def _kept(
+    hand: Hand,
+    fingers: Index,
+    spheres: LinkSpheres,
+    surface: SurfaceOfRevolution,
+    laid: Laid,
+    cone: float,
+    workspace: Workspace,
+) -> Candidates:
+    """The placements that hold, and a count of those that do not, by reason."""
+    q = laid.q
+    low, high = surface.profile.z_range
+    margin = END_MARGIN * (high - low)
+    frame = surface.frame
+    R_WB = np.einsum("ji,njk->nik", frame, laid.R_OB)
+    p_WB = surface.axis.point + laid.p_OB @ frame
+    tests = (
+        ("pads off the surface", np.all(np.abs(laid.gap) < GAP, axis=1)),
+        ("pad turned away", np.all(laid.pad_angle < cone, axis=1)),
+        ("beyond the ends", np.all((laid.z > low + margin) & (laid.z < high - margin), axis=1)),
+        ("base outside its workspace", workspace.allows(R_WB, p_WB)),
+    )
+    alive = np.arange(len(q))
+    rejected = [("placements laid", len(q))]
+    for reason, passed in tests:
+        rejected.append((reason, int(np.sum(~passed[alive]))))
+        alive = alive[passed[alive]]
+    free = _clear_of_object(hand, spheres, surface, q[alive], R_WB[alive], p_WB[alive])
+    rejected.append(("links inside the object", int(np.sum(~free))))
+    alive = alive[free]
+    return Candidates(
+        fingers[alive],
+        q[alive],
+        R_WB[alive],
+        p_WB[alive],
+        laid.theta[alive],
+        laid.z[alive],
+        laid.pad_angle[alive],
+        tuple(rejected),
+    )
+
+
+def _clear_of_object(
+    hand: Hand,
+    spheres: LinkSpheres,
+    surface: SurfaceOfRevolution,
+    q: Array,
+    R_WB: Array,
+    p_WB: Array,
+) -> Mask:
+    """Whether no link but the pads enters the believed object by more than INTRUSION, (N,)."""
+    if len(q) == 0:
+        return np.zeros(0, dtype=bool)
+    near_pad = spheres.finger_indices >= 0
+    local = spheres.positions(batch_placements(hand, q))
+    world = np.einsum("nij,nmj->nmi", R_WB, local) + p_WB[:, None]
+    clearance = surface.signed_distance(world) - spheres.radii
+    allowed = np.where(near_pad, -2.0 * INTRUSION, -INTRUSION)
+    return np.asarray(np.all(clearance > allowed, axis=1))
+
+
+def single_candidates(
+    hand: Hand,
+    postures: Postures,
+    spheres: LinkSpheres,
+    surface: SurfaceOfRevolution,
+    *,
+    cone: float,
+    count: int,
+    rng: np.random.Generator,
+    workspace: Workspace | None = None,
+) -> Candidates:
+    """Placements of the hand with one finger on the surface: every place an arm can bring it to.
+
+    The pad is put at a random place with its normal within half the cone, at a random roll; the
+    posture is drawn from the library.
+    """
+    fingers = rng.integers(len(hand.fingers), size=(count, 1)).astype(np.intp)
+    chosen = rng.choice(len(postures), size=count, replace=count > len(postures))
+    rows = np.arange(count)
+    centre = postures.pad_centres[chosen][rows, fingers[:, 0]]
+    normal = postures.pad_normals[chosen][rows, fingers[:, 0]]
+    low, high = surface.profile.z_range
+    inset = (END_MARGIN + 0.02) * (high - low)
+    theta = rng.uniform(-np.pi, np.pi, size=count)
+    z = rng.uniform(low + inset, high - inset, size=count)
+    place = surface.at(theta, z)
+    radius = np.array([f.pad_radius for f in hand.fingers])[fingers[:, 0]]
+    inward = unit(-place.n + 0.5 * np.tan(cone) * _in_disc(count, rng) * unit(place.k_z))
+    R_WB = _aligning(normal, inward, rng)
+    p_W = place.p + radius[:, None] * place.n
+    p_WB = p_W - np.einsum("nij,nj->ni", R_WB, centre)
+    frame = surface.frame
+    laid = Laid(
+        q=postures.q[chosen],
+        R_OB=np.einsum("ij,njk->nik", frame, R_WB),
+        p_OB=(p_WB - surface.axis.point) @ frame.T,
+        theta=theta[:, None],
+        z=z[:, None],
+        gap=np.zeros((count, 1)),
+        pad_angle=np.arccos(np.clip(-np.sum(inward * place.n, axis=1), -1.0, 1.0))[:, None],
+    )
+    return _kept(hand, fingers, spheres, surface, laid, cone, workspace or Workspace())
+
+
+def _in_disc(count: int, rng: np.random.Generator) -> Array:
+    return rng.uniform(-1.0, 1.0, size=(count, 1))
+
+
+def _aligning(a: Array, b: Array, rng: np.random.Generator) -> Array:
+    """Rotations (N, 3, 3) that take units a to b, the roll about b random."""
+
+    def frames(v: Array, roll: Array) -> Array:
+        helper = unit(np.cross(v, np.eye(3)[np.argmin(np.abs(v), axis=1)]))
+        other = np.cross(v, helper)
+        c, s = np.cos(roll)[:, None], np.sin(roll)[:, None]
+        return np.stack([v, c * helper + s * other, c * other - s * helper], axis=2)
+
+    roll = rng.uniform(-np.pi, np.pi, size=len(a))
+    return np.asarray(frames(b, roll) @ np.swapaxes(frames(a, np.zeros(len(a))), 1, 2))

@@ -1,0 +1,59 @@
+"""When to stop touching."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimator.belief import Belief
+
+
+@dataclass(frozen=True)
+class Goal:
+    """How well the axis must be known: with 95 % probability within these.
+
+    Args:
+        angle: Of the direction [rad].
+        offset: Of the axis beside the middle of what was touched [m].
+    Raises:
+        ValueError: Not positive.
+    """
+
+    angle: float
+    offset: float
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.angle <= 0.5 * np.pi:
+            raise ValueError(f"goal angle: expected 0 < angle <= pi/2 rad, got {self.angle}")
+        if not (np.isfinite(self.offset) and self.offset > 0.0):
+            raise ValueError(f"goal offset: expected a length > 0 m, got {self.offset}")
+
+    def met_by(self, belief: Belief) -> bool:
+        """Determined, and sure enough of direction and position."""
+        estimate = belief.estimate
+        return (
+            estimate is not None
+            and estimate.verdict == "determined"
+            and estimate.angle_95 <= self.angle
+            and estimate.offset_95 <= self.offset
+        )
+
+    def missing(self, belief: Belief) -> str:
+        """What is missing, in words; empty where the goal is met."""
+        estimate = belief.estimate
+        if estimate is None:
+            return "nothing was touched"
+        if estimate.verdict != "determined":
+            return f"{estimate.verdict}: {'; '.join(estimate.reasons)}"
+        parts = []
+        if estimate.angle_95 > self.angle:
+            parts.append(
+                f"direction within {np.rad2deg(estimate.angle_95):.1f} deg, "
+                f"asked {np.rad2deg(self.angle):.1f}"
+            )
+        if estimate.offset_95 > self.offset:
+            parts.append(
+                f"position within {1e3 * estimate.offset_95:.1f} mm, asked {1e3 * self.offset:.1f}"
+            )
+        return "; ".join(parts)

@@ -1,0 +1,90 @@
+"""Where planned touches would land if the object were a little other than believed.
+
+A plan is made for the believed object and carried out on the true one. Every candidate is
+therefore followed along its approach to many objects drawn from the belief.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimator.axis import Axis
+from estimator.belief import SampledObjects
+from estimator.profile import SplineProfile
+from estimator.singular import PlacedTriples
+from estimator.surface import Geometry, SurfaceOfRevolution
+from estimator.vectors import Array, Mask
+
+STROKE = 0.025  # how far before and beyond the expected contact an approach goes [m]
+RIM = 0.02  # of the height at each end where a touch does not count as one of the wall
+
+
+@dataclass(frozen=True, eq=False)
+class Prospects:
+    """Touches of N candidates with m fingers on B sampled objects, arrays (B, N, m).
+
+    Args:
+        geometry: Exact surface geometry where each approach meets the object, (B, N * m).
+        theta, z, r, dr, ddr: Places and profiles there.
+        hit: Whether the approach meets the wall within its stroke.
+    """
+
+    geometry: Geometry
+    theta: Array
+    z: Array
+    r: Array
+    dr: Array
+    ddr: Array
+    hit: Mask
+    points: Array
+    directions: Array
+
+    @property
+    def triples(self) -> PlacedTriples:
+        return PlacedTriples(self.theta, self.z, self.r, self.dr, self.ddr)
+
+
+def prospects(samples: SampledObjects, p_W: Array, n_W: Array) -> Prospects:
+    """Follow approaches along -n to each sampled object.
+
+    Args:
+        p_W, n_W: Expected contacts and outward normals, (N, m, 3) [m], unit.
+    """
+    shape = p_W.shape[:2]
+    p, n = p_W.reshape(-1, 3), n_W.reshape(-1, 3)
+    rows = [_on_object(samples, b, p, n) for b in range(len(samples.points))]
+    geometry = Geometry(*(np.stack(x) for x in zip(*(row[0] for row in rows), strict=True)))
+    theta, z, r, dr, ddr, hit = (
+        np.stack(x).reshape(-1, *shape) for x in zip(*(row[1] for row in rows), strict=True)
+    )
+    return Prospects(
+        geometry, theta, z, r, dr, ddr, hit.astype(bool), samples.points, samples.directions
+    )
+
+
+def _on_object(
+    samples: SampledObjects, b: int, p: Array, n: Array
+) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+    profile = SplineProfile(samples.z, samples.radii[b])
+    surface = SurfaceOfRevolution(Axis(samples.points[b], samples.directions[b]), profile)
+    low, high = profile.z_range
+    s = np.zeros(len(p))
+    for _ in range(6):
+        theta, rho, z = surface.cylindrical(p - s[:, None] * n)
+        r, dr, _ = profile.derivatives(np.clip(z, low, high))
+        rad = np.column_stack([np.cos(theta), np.sin(theta)]) @ surface.frame[:2]
+        slope = -np.sum(n * rad, axis=1) + dr * (n @ surface.axis.direction)
+        s = np.clip(s - (rho - r) / np.minimum(slope, -0.2), -1.5 * STROKE, 1.5 * STROKE)
+    theta, rho, z = surface.cylindrical(p - s[:, None] * n)
+    inset = RIM * (high - low)
+    inside = np.clip(z, low, high)
+    r, dr, ddr = profile.derivatives(inside)
+    hit = (np.abs(rho - r) < 5e-4) & (np.abs(s) < STROKE)
+    hit &= (z > low + inset) & (z < high - inset)
+    g = surface.at(theta, inside)
+    return (
+        (g.p, g.n, g.k_theta, g.k_z, g.kappa_theta, g.kappa_z),
+        (theta, inside, r, dr, ddr, hit),
+    )
