@@ -23,7 +23,7 @@ def read(name):
 
 
 def printed(name):
-    """Positions [in] (n, 3) and directions (n, 2, 3) as printed: normalised, not made orthogonal."""
+    """Positions [in] (n, 3), directions (n, 2, 3) as printed: normalised, not made orthogonal."""
     contacts = read(name)["contacts"]
     directions = np.array([c["directions"] for c in contacts])
     return np.array([c["position"] for c in contacts]), unit(directions)
