@@ -14,7 +14,9 @@ from estimator.estimate import AxisEstimate, Hypothesis
 from estimator.fusion import estimate_axis
 from estimator.prior import AxisPrior
 from estimator.surface import SurfaceOfRevolution
-from estimator.vectors import Array, frozen
+from estimator.vectors import Array, frozen, unit
+
+WALL = 0.3  # n . rad from which a contact tells radius and slope: r' up to about 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,18 +137,25 @@ def _touched_band(
     band: ProfileBand, hypothesis: Hypothesis, contacts: tuple[Contact, ...]
 ) -> ProfileBand:
     """Radius and slope of every contact about the likeliest axis, eqs (1), (2)."""
+    axis = hypothesis.axis
+    contacts = tuple(c for c in contacts if _on_wall(c, axis))
     if not contacts:
         return band
-    axis = hypothesis.axis
     p = np.array([c.position for c in contacts])
     n = np.array([c.normal for c in contacts])
     z = (p - axis.point) @ axis.direction
     away = p - axis.foot(p)
     r = np.linalg.norm(away, axis=1)
     rad = away / r[:, None]
-    dr = -(n @ axis.direction) / np.maximum(np.sum(n * rad, axis=1), 0.1)  # (2): n ~ rad - r' u
+    dr = -(n @ axis.direction) / np.sum(n * rad, axis=1)  # (2): n ~ rad - r' u
     sd = np.sqrt(np.diag(hypothesis.covariance))
     noise = [c.noise for c in contacts]
     r_sd = np.hypot([s.position for s in noise], np.hypot(sd[0], sd[1]))
     dr_sd = (1.0 + dr**2) * np.hypot([s.normal for s in noise], np.hypot(sd[2], sd[3]))
     return band.conditioned(z, r, dr, r_sd=r_sd, dr_sd=dr_sd)
+
+
+def _on_wall(contact: Contact, axis: Axis) -> bool:
+    """Whether the normal looks away from the axis; on a flat end it looks along it."""
+    rad = unit(contact.position - axis.foot(contact.position))
+    return float(contact.normal @ rad) > WALL

@@ -137,7 +137,7 @@ def stacked_readings(
     kappa = np.where(saturated, 0.0, kappa_read)
     deviator = column("deviator")
     half = 0.5 * np.abs(kappa[..., 0] - kappa[..., 1])
-    void = half <= UMBILIC * deviator
+    void = half < UMBILIC * deviator
     psi = np.hypot(deviator / np.maximum(2.0 * half, 1e-12), column("direction"))
     psi = np.where(void, VOID_DIRECTION, np.maximum(psi, 1e-9))
     even = (column("mean_curvature") ** 2 + deviator**2)[:, None]

@@ -1,0 +1,144 @@
+"""Measured contacts from files, and estimates to files: plain JSON, SI out.
+
+Contacts in:
+
+    {"unit": "m" | "mm" | "in",
+     "contacts": [{"position": [3], "normal": [3], "directions": [[3], [3]], "curvatures": [2]}]}
+
+Positions in the unit, curvatures per unit; a curvature is null where it saturated, flatter than
+the sensor resolves. Both null means that curvatures were not measured, only their directions.
+Other keys are left alone.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from estimator.contact import Contact, SensorNoise, measured_contact, require_distinct
+from estimator.estimate import AxisEstimate, Hypothesis
+
+UNITS = {"m": 1.0, "mm": 1e-3, "in": 0.0254}
+FIELDS = ("position", "normal", "directions", "curvatures")
+UNMEASURED = 1e6  # sd of a curvature that nobody measured [1/m]
+
+
+def read_contacts(path: Path, noise: SensorNoise) -> tuple[Contact, ...]:
+    """Contacts from a JSON file, in metres.
+
+    Args:
+        noise: What the sensor that made the file is worth.
+    Raises:
+        ValueError: Says that the file cannot be read, or which field of which contact is wrong
+            and what is allowed.
+    """
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be read ({error.strerror})") from None
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: not JSON: {error}") from None
+    try:
+        return contacts_from_record(record, noise)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def contacts_from_record(record: Any, noise: SensorNoise) -> tuple[Contact, ...]:
+    """Contacts from parsed JSON.
+
+    Raises:
+        ValueError: As `read_contacts`.
+    """
+    if not isinstance(record, Mapping):
+        raise ValueError('expected an object {"unit": ..., "contacts": [...]}')
+    unit = record.get("unit")
+    if unit not in UNITS:
+        raise ValueError(f"unit: expected one of {', '.join(UNITS)}, got {unit!r}")
+    entries = record.get("contacts")
+    if not isinstance(entries, list):
+        raise ValueError(f"contacts: expected a list, got {type(entries).__name__}")
+    contacts = []
+    for number, entry in enumerate(entries, start=1):
+        try:
+            contacts.append(_contact(entry, UNITS[unit], noise))
+        except ValueError as error:
+            raise ValueError(f"contact {number}: {error}") from None
+    require_distinct(contacts, minimum=2)
+    return tuple(contacts)
+
+
+def _contact(entry: Any, metres: float, noise: SensorNoise) -> Contact:
+    if not isinstance(entry, Mapping):
+        raise ValueError(f"expected an object with {', '.join(FIELDS)}, got {entry!r}")
+    missing = [name for name in FIELDS if name not in entry]
+    if missing:
+        raise ValueError(f"{', '.join(missing)}: missing")
+    curvatures = _curvatures(entry["curvatures"]) / metres
+    if np.all(np.isnan(curvatures)):
+        noise = replace(noise, deviator=0.0, flat=UNMEASURED)
+    position = _numbers("position", entry["position"], (3,)) * metres
+    normal = _numbers("normal", entry["normal"], (3,))
+    directions = _numbers("directions", entry["directions"], (2, 3))
+    return measured_contact(position, normal, directions, curvatures, noise)
+
+
+def _numbers(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray[Any, Any]:
+    try:
+        array = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name}: expected numbers of shape {shape}, got {value!r}") from None
+    if array.shape != shape or not np.all(np.isfinite(array)):
+        raise ValueError(f"{name}: expected finite numbers of shape {shape}, got {value!r}")
+    return array
+
+
+def _curvatures(value: Any) -> np.ndarray[Any, Any]:
+    allowed = "two numbers, null where saturated"
+    if not isinstance(value, list) or len(value) != 2:
+        raise ValueError(f"curvatures: expected {allowed}, got {value!r}")
+    for x in value:
+        if x is not None and not (
+            isinstance(x, int | float) and not isinstance(x, bool) and np.isfinite(x)
+        ):
+            raise ValueError(f"curvatures: expected {allowed}, got {value!r}")
+    return np.array([np.nan if x is None else float(x) for x in value])
+
+
+def estimate_record(estimate: AxisEstimate) -> dict[str, Any]:
+    """An estimate as JSON: SI, radians; the covariance's chart is named in it."""
+    return {
+        "axis": axis_record(estimate.best),
+        "covariance": estimate.covariance.tolist(),
+        "chart": (
+            "(t1, t2, w1, w2) [m, m, rad, rad]: offset across the axis at its point, and "
+            "rotation of its direction, along basis_across(direction)"
+        ),
+        "labellings": [
+            {"parallel_rows": list(labelling.parallel_rows), "probability": probability}
+            for labelling, probability in estimate.labellings
+        ],
+        "hypotheses": [
+            {
+                "axis": axis_record(h),
+                "covariance": h.covariance.tolist(),
+                "probability": h.probability,
+                "direction_offset": h.direction_offset,
+            }
+            for h in estimate.hypotheses
+        ],
+        "verdict": estimate.verdict,
+        "reasons": list(estimate.reasons),
+        "p_value": estimate.p_value,
+    }
+
+
+def axis_record(hypothesis: Hypothesis) -> dict[str, list[float]]:
+    """Point and direction of an axis as lists."""
+    axis = hypothesis.axis
+    return {"point": axis.point.tolist(), "direction": axis.direction.tolist()}
