@@ -1,4 +1,4 @@
-"""Nothing gets into a contact that a touch cannot say; each refusal names what would have worked."""
+"""Nothing gets into a contact that no touch can say; refusals name what would have worked."""
 
 from __future__ import annotations
 
