@@ -72,12 +72,12 @@ def label_log_odds(expected: Expected, noise: SensorNoise, prior: AxisPrior | No
     count, m = readings.p.shape[:2]
     problem, lines, labels = _wrong_starts(readings, expected)
     wrong = _posterior(readings.take(problem), expected.points[problem], prior)
-    _, terms = climb(wrong, lines, labels, iterations=12, gain_at_rest=1e-2)
+    _, terms = climb(wrong, lines, labels, iterations=8, gain_at_rest=1e-1)
     best = np.full(count, np.inf)
     np.minimum.at(best, problem, terms.cost)
     truth = Lines(expected.points, expected.directions, np.zeros(count))
     right = _posterior(readings, expected.points, prior)
-    return best - right.at(truth, np.zeros((count, m), dtype=np.intp)).cost
+    return np.asarray(best - right.at(truth, np.zeros((count, m), dtype=np.intp)).cost)
 
 
 def _posterior(readings: Readings, points: Array, prior: AxisPrior | None) -> Posterior:

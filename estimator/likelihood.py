@@ -173,8 +173,8 @@ def evaluate(readings: Readings, lines: Lines) -> Terms:
     dm_k[..., 4] = np.einsum("...x,...x->...", dk_z, g.rad[:, :, None])
     beta, d_beta, m_n, dm_n = (np.repeat(x, 2, axis=2) for x in (beta, d_beta, m_n, dm_n))
     plane = _plane_terms(
-        readings, g, np.stack([alpha, beta], -1), np.stack([d_alpha, d_beta], -1),
-        np.stack([m_k, m_n], -1), np.stack([dm_k, dm_n], -1),
+        readings, g, np.stack([alpha, beta]), np.stack([d_alpha, d_beta]),
+        np.stack([m_k, m_n]), np.stack([dm_k, dm_n]),
     )  # fmt: skip
     bend = _curvature_terms(readings, g, m_n, dm_n)
     parts = (plane, bend, _inside_terms(m_n, dm_n), _size_terms(readings, g))
@@ -251,29 +251,34 @@ def _dot_rad(x: Array, g: _Geometry) -> tuple[Array, Array]:
 def _plane_terms(
     readings: Readings, g: _Geometry, error: Array, d_error: Array, m: Array, dm: Array
 ) -> Terms:
-    """alpha and beta with their joint covariance; error, m (S,n,2,2), derivatives (S,n,2,5,2)."""
+    """alpha and beta with their joint covariance; pairs (2, S, n, 2), derivatives one axis more.
+
+    Written out for the 2x2 matrix C: gradient J^T y + tr(C^-1 dC)/2 - y^T dC y/2, y = C^-1 error.
+    """
     tau = (readings.var_p / g.r**2)[:, :, None]
     d_tau = -2.0 * tau[..., None] * (g.dr / g.r[..., None])[:, :, None]
-    base = np.stack([readings.var_psi, readings.var_n], -1)[:, :, None]
-    c_aa = base[..., 0] + tau * m[..., 0] ** 2
-    c_bb = base[..., 1] + tau * m[..., 1] ** 2
-    c_ab = tau * m[..., 0] * m[..., 1]
+    c_aa = readings.var_psi[:, :, None] + tau * m[0] ** 2
+    c_bb = readings.var_n[:, :, None] + tau * m[1] ** 2
+    c_ab = tau * m[0] * m[1]
     det = c_aa * c_bb - c_ab**2
-    inverse = np.empty((*det.shape, 2, 2))
-    inverse[..., 0, 0], inverse[..., 1, 1] = c_bb / det, c_aa / det
-    inverse[..., 0, 1] = inverse[..., 1, 0] = -c_ab / det
-    mm = m[..., None, :, None] * m[..., None, None, :]
-    mixed = tau[..., None, None, None] * dm[..., :, :, None] * m[..., None, None, :]
-    d_c = d_tau[..., None, None] * mm + mixed + np.swapaxes(mixed, -1, -2)
-    y = np.einsum("...ij,...j->...i", inverse, error)
-    chi_square = np.einsum("...i,...i->...", error, y)
-    whitened = np.einsum("...ij,...pjk->...pik", inverse, d_c)  # C^-1 dC
-    gradient = np.einsum("...pi,...i->...p", d_error, y)
-    gradient += 0.5 * np.einsum("...pii->...p", whitened)
-    gradient -= 0.5 * np.einsum("...i,...pij,...j->...p", y, d_c, y)
-    fisher = np.einsum("...pi,...ij,...qj->...pq", d_error, inverse, d_error)
-    fisher += 0.5 * np.einsum("...pij,...qji->...pq", whitened, whitened)
-    return Terms(0.5 * (chi_square + np.log(det)), gradient, fisher, chi_square)
+    w_aa, w_bb, w_ab = c_bb / det, c_aa / det, -c_ab / det  # C^-1
+    y_a, y_b = w_aa * error[0] + w_ab * error[1], w_ab * error[0] + w_bb * error[1]
+    chi_square = error[0] * y_a + error[1] * y_b
+    m_a, m_b, t = m[0][..., None], m[1][..., None], tau[..., None]
+    d_aa = m_a * (d_tau * m_a + 2.0 * t * dm[0])
+    d_bb = m_b * (d_tau * m_b + 2.0 * t * dm[1])
+    d_ab = d_tau * m_a * m_b + t * (dm[0] * m_b + m_a * dm[1])
+    w_aa, w_bb, w_ab, y_a, y_b = (x[..., None] for x in (w_aa, w_bb, w_ab, y_a, y_b))
+    gradient = d_error[0] * y_a + d_error[1] * y_b
+    gradient += 0.5 * ((w_aa - y_a**2) * d_aa + (w_bb - y_b**2) * d_bb)
+    gradient += (w_ab - y_a * y_b) * d_ab
+    p_aa, p_ab = w_aa * d_aa + w_ab * d_ab, w_aa * d_ab + w_ab * d_bb  # C^-1 dC
+    p_ba, p_bb = w_ab * d_aa + w_bb * d_ab, w_ab * d_ab + w_bb * d_bb
+    weighted_a = w_aa * d_error[0] + w_ab * d_error[1]
+    weighted_b = w_ab * d_error[0] + w_bb * d_error[1]
+    left = np.stack([weighted_a, weighted_b, 0.5 * p_aa, 0.5 * p_ab, 0.5 * p_ba, 0.5 * p_bb], -1)
+    right = np.stack([d_error[0], d_error[1], p_aa, p_ba, p_ab, p_bb], -2)
+    return Terms(0.5 * (chi_square + np.log(det)), gradient, left @ right, chi_square)
 
 
 def _curvature_terms(readings: Readings, g: _Geometry, m_n: Array, dm_n: Array) -> Terms:

@@ -1,0 +1,288 @@
+"""The front door: probes that this hand can make, chosen by what they would tell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+
+import numpy as np
+import pinocchio as pin
+
+from estimator.belief import Belief, sample_objects
+from estimator.bounds import AxisBound
+from estimator.contact import Contact, SensorNoise
+from estimator.surface import Place, SurfaceOfRevolution
+from estimator.vectors import Array
+from hand_models.hand import Hand
+from hand_models.postures import Postures, posture_library
+from hand_models.spheres import LinkSpheres, link_spheres
+from planner.candidates import Candidates, placement_candidates, single_candidates
+from planner.choice import MARGIN, Ranking, rank
+from planner.goal import Goal
+from planner.motion import Approach, approach_by_base, plan_approaches
+from planner.reach import Reach, ReachSolver, Unreachable
+from planner.reach_task import ReachOptions
+from planner.solid import RevolvedSolid
+from planner.starts import Start
+
+Funnel = tuple[tuple[str, int], ...]
+
+SOLID_HEIGHTS = 101
+
+
+@dataclass(frozen=True, eq=False)
+class PlannerOptions:
+    """How a plan is made.
+
+    Args:
+        reach: Rules of reachability: pad cone, clearances, the arm's workspace, stroke.
+        fingers_at_once: Contacts of one placement of the hand; fewer where so many do not reach.
+        margin: Smallest margin from every singularity, kept by nine in ten sampled objects [-].
+        placements: How many postures are laid onto the believed surface.
+        objects: How many objects are drawn from the belief.
+        tries: How many of the best placements are handed to the optimiser.
+    """
+
+    reach: ReachOptions = field(default_factory=lambda: ReachOptions(starts=0, rescues=1))
+    fingers_at_once: int = 3
+    margin: float = MARGIN
+    placements: int = 1200
+    objects: int = 12
+    tries: int = 24
+
+    def __post_init__(self) -> None:
+        if self.fingers_at_once not in (1, 2, 3):
+            raise ValueError(f"fingers_at_once: expected 1, 2 or 3, got {self.fingers_at_once}")
+        for name in ("placements", "objects", "tries"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name}: expected at least 1, got {getattr(self, name)}")
+
+
+@dataclass(frozen=True, eq=False)
+class Probe:
+    """One touch to make.
+
+    Args:
+        finger: Which finger.
+        place: Where on the believed surface.
+        expected: The contact if the object is as believed (first row the parallel's).
+        q: Joint positions with the pad on the contact [rad].
+        approach: The way there, and beyond, should the object be farther away.
+    """
+
+    finger: str
+    place: Place
+    expected: Contact
+    q: Array
+    approach: Approach
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Probes of one placement of the hand, in order, and why these.
+
+    Args:
+        probes: One for each finger that touches.
+        reach: Joint angles and base pose with all pads on their contacts, certified.
+        bound: Worst case of the axis from the best pair of the probes.
+        covariance: Of the axis after the probes, if the object is as believed, (4, 4).
+        angle, offset: Expected error of the axis after them, over the belief [rad], [m].
+        margin: From the nearest singularity, in nine of ten objects; inf below three contacts.
+        nearest: That singularity in words.
+        label_probability: That the labels come out right; NaN where it was not computed.
+        funnel: How many candidates there were, and what refused the others.
+    """
+
+    probes: tuple[Probe, ...]
+    reach: Reach
+    bound: AxisBound
+    covariance: Array
+    angle: float
+    offset: float
+    margin: float
+    nearest: str
+    label_probability: float
+    funnel: Funnel
+
+
+class NoPlan(Exception):
+    """Nothing that this hand reaches would do.
+
+    Attributes:
+        funnel: What refused the candidates, with counts, in order.
+    """
+
+    def __init__(self, funnel: Funnel) -> None:
+        self.funnel = funnel
+        told = ", ".join(f"{reason} {count}" for reason, count in funnel if count)
+        super().__init__(
+            f"no placement of the hand makes good contacts: {told}. A wider pad cone, a larger "
+            "workspace, or an object nearer to the hand would help"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Tools:
+    """What is built once per hand and options."""
+
+    hand: Hand
+    postures: Postures
+    spheres: LinkSpheres
+    solver: ReachSolver
+
+
+@lru_cache(maxsize=8)
+def _tools(hand: Hand, options: ReachOptions) -> _Tools:
+    return _Tools(hand, posture_library(hand), link_spheres(hand), ReachSolver(hand, options))
+
+
+def plan_probes(
+    hand: Hand,
+    belief: Belief,
+    sensor: SensorNoise,
+    *,
+    goal: Goal,
+    rng: np.random.Generator,
+    options: PlannerOptions | None = None,
+) -> Plan:
+    """The most useful touches that one placement of this hand can make.
+
+    Idea: postures of the hand are laid onto the believed surface (`candidates`), singular triples
+    are refused over samples of the belief and the rest ranked by expected error, label odds and
+    pair bound (`choice`), and the best are made exact and certified (`reach`) until one holds,
+    with approaches before and beyond the contacts (`motion`). Where no three fingers reach, two
+    are tried, then one.
+
+    Raises:
+        NoPlan: Not even a single touch is left; its funnel says why.
+    """
+    options = options or PlannerOptions()
+    tools = _tools(hand, options.reach)
+    funnel: Funnel = ()
+    for count in range(min(options.fingers_at_once, len(hand.fingers)), 0, -1):
+        found = _best_placement(tools, belief, sensor, goal, options, count, rng)
+        if isinstance(found, Plan):
+            return _with_funnel(found, funnel)
+        funnel += found
+    raise NoPlan(funnel)
+
+
+def _best_placement(
+    tools: _Tools,
+    belief: Belief,
+    sensor: SensorNoise,
+    goal: Goal,
+    options: PlannerOptions,
+    count: int,
+    rng: np.random.Generator,
+) -> Plan | Funnel:
+    """The best placement with `count` fingers that reach certifies, or what refused them all."""
+    candidates = _candidates(tools, belief.surface, options, count, rng)
+    funnel = tuple((f"{count} fingers: {reason}", n) for reason, n in candidates.rejected)
+    if len(candidates) == 0:
+        return funnel
+    samples = sample_objects(belief, options.objects, rng=rng)
+    ranking = rank(candidates, belief, samples, sensor, goal, margin=options.margin)
+    funnel += tuple((f"{count} fingers: singular: {words}", n) for words, n in ranking.rejected)
+    solid = _solid(belief.surface)
+    failures: dict[str, int] = {}
+    for i in ranking.order[: options.tries].tolist():
+        made = _made(tools, belief.surface, solid, candidates, i)
+        if isinstance(made, tuple):
+            refused = tuple((f"{count} fingers: out of reach: {r}", n) for r, n in failures.items())
+            return _plan(belief.surface, sensor, candidates, ranking, i, made, funnel + refused)
+        failures[made] = failures.get(made, 0) + 1
+    return funnel + tuple((f"{count} fingers: out of reach: {r}", n) for r, n in failures.items())
+
+
+def _candidates(
+    tools: _Tools,
+    surface: SurfaceOfRevolution,
+    options: PlannerOptions,
+    count: int,
+    rng: np.random.Generator,
+) -> Candidates:
+    if count == 1:
+        return single_candidates(
+            tools.hand,
+            tools.postures,
+            tools.spheres,
+            surface,
+            cone=options.reach.cone,
+            workspace=options.reach.workspace,
+            count=options.placements,
+            rng=rng,
+        )
+    return placement_candidates(
+        tools.hand,
+        tools.postures,
+        tools.spheres,
+        surface,
+        cone=options.reach.cone,
+        workspace=options.reach.workspace,
+        count=options.placements,
+        fingers_at_once=count,
+        rng=rng,
+    )
+
+
+def _solid(surface: SurfaceOfRevolution) -> RevolvedSolid:
+    """The believed object as the optimiser's obstacle."""
+    z = np.linspace(*surface.profile.z_range, SOLID_HEIGHTS)
+    X_WO = pin.SE3(np.ascontiguousarray(surface.frame.T), np.array(surface.axis.point))
+    return RevolvedSolid(X_WO, z, surface.profile.derivatives(z)[0])
+
+
+def _made(
+    tools: _Tools,
+    surface: SurfaceOfRevolution,
+    solid: RevolvedSolid,
+    candidates: Candidates,
+    i: int,
+) -> tuple[Reach, tuple[Approach, ...]] | str:
+    """A certified reach with its approaches, or the reason why there is none."""
+    place = surface.at(candidates.theta[i], candidates.z[i])
+    names = tuple(tools.hand.fingers[k].name for k in candidates.fingers[i])
+    start = Start(names, candidates.q[i], candidates.base(i))
+    several = len(names) > 1
+    reach = tools.solver.solve(
+        place.p, place.n, solid, fingers=names, starts=[start], motion=several
+    )
+    if isinstance(reach, Unreachable):
+        return reach.reason
+    if several:
+        return reach, tuple(plan_approaches(tools.hand, reach))
+    return reach, (approach_by_base(tools.hand, reach),)
+
+
+def _plan(
+    surface: SurfaceOfRevolution,
+    sensor: SensorNoise,
+    candidates: Candidates,
+    ranking: Ranking,
+    i: int,
+    made: tuple[Reach, tuple[Approach, ...]],
+    funnel: Funnel,
+) -> Plan:
+    reach, approaches = made
+    probes = []
+    for j, approach in enumerate(approaches):
+        place = Place(float(candidates.theta[i, j]), float(candidates.z[i, j]))
+        expected = surface.contact(place, sensor)
+        probes.append(Probe(approach.finger, place, expected, reach.q, approach))
+    return Plan(
+        probes=tuple(probes),
+        reach=reach,
+        bound=AxisBound(float(ranking.pair_bound.position[i]), float(ranking.pair_bound.angle[i])),
+        covariance=ranking.covariance[i],
+        angle=float(ranking.angle[i]),
+        offset=float(ranking.offset[i]),
+        margin=float(ranking.margin[i]),
+        nearest=ranking.nearest[i],
+        label_probability=float(ranking.label_probability[i]),
+        funnel=funnel,
+    )
+
+
+def _with_funnel(plan: Plan, before: Funnel) -> Plan:
+    return plan if not before else replace(plan, funnel=before + plan.funnel)
