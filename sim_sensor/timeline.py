@@ -1,0 +1,147 @@
+"""When everything happens on the page: beats of an act, and the hand's postures in time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from estimator.contact import Contact
+from estimator.vectors import Array, unit
+from sim_sensor.episode import Act, Episode
+
+LOOK, MOVE, STAY, APPROACH, FEEL, RETREAT = 1.5, 1.6, 0.5, 1.8, 2.6, 1.2  # durations [s]
+STEPS = 10  # postures of an approach; straight in the joints between them
+LIFT = 0.10  # how far the hand moves aside when it is laid anew [m]
+
+
+@dataclass(frozen=True)
+class Beat:
+    """Times of one act [s].
+
+    Args:
+        start: The hand begins to go to the act's first posture.
+        approach: The finger begins to approach.
+        touch: It touches, or has missed.
+        retreat: It begins to go back.
+        end: It is back where it began.
+    """
+
+    start: float
+    approach: float
+    touch: float
+    retreat: float
+    end: float
+
+
+@dataclass(frozen=True, eq=False)
+class Posture:
+    """The hand at a time.
+
+    Args:
+        time: [s].
+        q: Configuration, shape (nq,).
+        X_WB: Pose of its base in the world.
+    """
+
+    time: float
+    q: Array
+    X_WB: pin.SE3
+
+
+def schedule(acts: tuple[Act, ...]) -> tuple[Beat, ...]:
+    """Beats of all acts, one after another; an act at the same place follows sooner."""
+    beats: list[Beat] = []
+    now = 0.0
+    for i, act in enumerate(acts):
+        stays = i > 0 and _same_place(acts[i - 1], act)
+        approach = now + (LOOK if i == 0 else STAY if stays else MOVE)
+        touch = approach + APPROACH
+        beats.append(Beat(now, approach, touch, touch + FEEL, touch + FEEL + RETREAT))
+        now = beats[-1].end
+    return tuple(beats)
+
+
+def postures(model: pin.Model, episode: Episode, beats: tuple[Beat, ...]) -> tuple[Posture, ...]:
+    """The hand through all acts: to the start, along the path to its stop, wait, and back."""
+    frames: list[Posture] = []
+    for act, beat in zip(episode.acts, beats, strict=True):
+        if frames:
+            begin = Posture(beat.approach, *act.posture(model, 0.0))
+            frames += _moves(model, frames[-1], begin, episode.centre)
+        there = np.linspace(0.0, 1.0, STEPS)
+        for s in there:
+            time = beat.approach + s * (beat.touch - beat.approach)
+            frames.append(Posture(time, *act.posture(model, s * act.stop)))
+        for s in there:
+            time = beat.retreat + s * (beat.end - beat.retreat)
+            frames.append(Posture(time, *act.posture(model, (1.0 - s) * act.stop)))
+    first = frames[0]
+    return (Posture(0.0, first.q, first.X_WB), *frames)
+
+
+def captions(episode: Episode, beats: tuple[Beat, ...]) -> list[dict[str, object]]:
+    """What the page says from which time on: `{"time", "head", "body"}`, in degrees and mm."""
+    lines = []
+    for number, (act, beat) in enumerate(zip(episode.acts, beats, strict=True), start=1):
+        name = f"Probe {number} of {len(episode.acts)}: {act.finger}"
+        before, after = (_sureness(episode, act, i) for i in (0, 1))
+        felt = isinstance(act.outcome, Contact)
+        doing = (f"{name} approaches", f"{name} {'touches' if felt else 'meets nothing'}")
+        lines.append(_caption(beat.start, doing[0], f"believed axis: {before}"))
+        learnt = [f"before: {before}", f"after: {after}", _felt(act), act.note]
+        lines.append(_caption(beat.touch, doing[1], "\n".join(line for line in learnt if line)))
+        lines.append(_caption(beat.retreat, f"{name} goes back", f"believed axis: {after}"))
+    last = _sureness(episode, episode.acts[-1], 1)
+    end = "\n".join(line for line in (f"believed axis: {last}", episode.conclusion) if line)
+    lines.append(_caption(beats[-1].end, "Done", end))
+    return lines
+
+
+def _caption(time: float, head: str, body: str) -> dict[str, object]:
+    return {"time": time, "head": head, "body": body}
+
+
+def _sureness(episode: Episode, act: Act, when: int) -> str:
+    belief = (act.before, act.after)[when]
+    angle, offset = belief.errors(episode.surface.axis, episode.centre)
+    return (
+        f"95 % within {np.rad2deg(belief.angle_95()):.1f}° and "
+        f"{1e3 * belief.offset_95(episode.centre):.1f} mm "
+        f"(truly off by {np.rad2deg(angle):.1f}° and {1e3 * offset:.1f} mm)"
+    )
+
+
+def _felt(act: Act) -> str:
+    if not isinstance(act.outcome, Contact):
+        return ""
+    radii = " and ".join(_radius(float(k)) for k in act.outcome.curvatures)
+    return f"felt: radii {radii}; which is the parallel's, it does not say"
+
+
+def _radius(curvature: float) -> str:
+    if not abs(curvature) > 1e-3:  # NaN where the sensor saturated
+        return "flat"
+    return f"{1e3 / abs(curvature):.0f} mm" + (" (hollow)" if curvature < 0 else "")
+
+
+def _same_place(a: Act, b: Act) -> bool:
+    return bool(a.bases[0].isApprox(b.bases[0], 1e-6))
+
+
+def _moves(
+    model: pin.Model, begin: Posture, end: Posture, centre: Array, count: int = 8
+) -> list[Posture]:
+    """Postures between two acts; a hand that is laid anew swings out, away from the object."""
+    if begin.X_WB.isApprox(end.X_WB, 1e-6):
+        return []
+    middle = 0.5 * (begin.X_WB.translation + end.X_WB.translation) - centre
+    out = unit(middle + np.array([0.0, 0.0, 1e-3]))
+    frames = []
+    for s in np.linspace(0.0, 1.0, count)[1:-1]:
+        X_WB = pin.SE3.Interpolate(begin.X_WB, end.X_WB, float(s))
+        X_WB.translation = X_WB.translation + LIFT * np.sin(np.pi * s) * out
+        q = pin.interpolate(model, begin.q, end.q, float(s))
+        frames.append(Posture(begin.time + s * (end.time - begin.time), q, X_WB))
+    return frames
