@@ -5,6 +5,8 @@ Lengths in inches where the paper's figures 5 and 8 are reproduced (r = rho = 1 
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
@@ -214,8 +216,9 @@ def test_tilt_gains_are_infinite_on_one_meridian_plane():
     assert np.isfinite([gains.rms[1], gains.worst[1], gains.common[1]]).all()
 
 
-def test_bounds_from_noise_hold_two_sigma_of_sampled_curvature_tensors():
-    noise, rng, n = SENSORS["gel"], np.random.default_rng(6), 100_000
+@pytest.mark.parametrize("normal", [0.012, 0.15])
+def test_bounds_from_noise_hold_two_sigma_of_sampled_curvature_tensors(normal):
+    noise, rng, n = replace(SENSORS["gel"], normal=normal), np.random.default_rng(6), 100_000
     kappa_theta, kappa_z = 28.0, 3.0
     errors = SensorErrors.from_noise(noise, np.array(kappa_theta), np.array(kappa_z))
     half, xy = noise.deviator * rng.normal(size=(2, n))
@@ -225,7 +228,7 @@ def test_bounds_from_noise_hold_two_sigma_of_sampled_curvature_tensors():
     turn = 0.5 * np.arctan2(xy, difference)
     tilt = noise.normal * rng.normal(size=n)
     outside = np.mean(np.hypot(turn, tilt) > errors.parallel_direction)
-    assert 0.02 < outside < 0.06
+    assert 0.03 < outside < 0.06
     kappa = (0.5 * (kappa_theta + kappa_z) + mean + np.hypot(difference, xy)) * scale
     outside = np.mean(np.abs(kappa_theta / kappa - 1.0) > errors.relative_radius)
     assert 0.03 < outside < 0.07

@@ -20,12 +20,15 @@ from estimator.surface import SurfaceOfRevolution
 
 NAMES = [s.name for s in SINGULARITIES]
 TOLERANCE = 1e-7
+MEET = np.sqrt(0.6 / 1.28)  # a_z(z) = 0 at 0 and here, for r = 1 - 0.8 z^2
 PROFILES = {  # in units of the radius; each with a few heights, on purpose equal or mirrored
     "cylinder": (cylinder(1.0, 2.0), (-0.5, 0.0, 0.5)),
     "cone": (cone(1.0, -0.3, 2.0), (-0.5, 0.1, 0.5)),
     "barrel": (barrel(1.0, 0.15, 2.0), (-0.4, 0.0, 0.4, 0.6)),
     "torus": (ArcProfile(2.0, 0.7, (-0.6, 0.6)), (-0.3, 0.0, 0.3)),
     "torus, inside": (ArcProfile(2.0, 0.7, (-0.6, 0.6), outer=False), (-0.3, 0.0, 0.2)),
+    # the paper's Figure 1: normals meet on the axis from three parallels of unequal slope
+    "short barrel": (PolynomialProfile((1.0, 0.0, -0.8), (-0.8, 0.8)), (-MEET, 0.0, MEET)),
     "hyperboloid": (PolynomialProfile((1.0, 0.0, 0.3), (-0.7, 0.7)), (-0.5, 0.0, 0.5)),
 }
 # the sines in (57), (58) are as r_1'(a_3 - a_2) : r_2'(a_1 - a_3) : r_3'(a_2 - a_1), so these must
@@ -139,12 +142,21 @@ def test_all_swapped_margin_is_the_quotient_of_singular_values():
     np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-9)
 
 
+def test_a_cylinders_swapped_planes_are_parallel_and_as_far_apart_as_the_heights():
+    z = np.array([[-0.5, 0.0, 0.5], [0.1, 0.1, 0.4], [0.2, 0.2, 0.2]])
+    t = placed_triples(PROFILES["cylinder"][0], np.array([0.0, 1.0, 3.0]), z)
+    found = column("all swapped 1-2-3", margins(t).values)
+    spread = np.linalg.norm(z - z.mean(axis=1, keepdims=True), axis=1)
+    np.testing.assert_allclose(found, spread, atol=1e-12)
+
+
 SINGULAR_PLACES = {
     "one meridian plane 1-2-3": ("barrel", [0, 180, 0], [-0.4, 0.1, 0.6]),
     "one upright parallel 1-2-3": ("barrel", [0, 110, 230], [0, 0, 0]),
     "shared meridian 2-3": ("cone", [0, 110, 110], [-0.4, 0.1, 0.6]),
     "opposite meridians 3-1": ("cylinder", [10, 110, 190], [-0.4, 0.1, 0.6]),
     "normals meet 1-2": ("cone", [-50, 50, 0], [0.2, 0.2, 0.6]),
+    "normals meet 3-1": ("short barrel", [0, 50, 140], [0, 0.3, MEET]),
     "normals meet 2-3": ("cylinder", [0, 100, 215], [0.5, 0.2, 0.2]),
 }
 
