@@ -113,7 +113,8 @@ def _hypotheses(peaks: list[Peak], probabilities: Array) -> tuple[Hypothesis, ..
 
 def _separation(a: Peak, b: Peak) -> float:
     x = chart_coordinates(a.point, a.direction, b.point[None], b.direction[None])[0]
-    return float(np.sqrt(x @ np.linalg.solve(_covariance(a) + _covariance(b), x)))
+    squared = x @ np.linalg.solve(_covariance(a) + _covariance(b), x)
+    return float(np.sqrt(max(squared, 0.0)))
 
 
 def _covariance(peak: Peak) -> Array:

@@ -138,7 +138,8 @@ def stacked_readings(
     deviator = column("deviator")
     half = 0.5 * np.abs(kappa[..., 0] - kappa[..., 1])
     void = half < UMBILIC * deviator
-    psi = np.hypot(deviator / np.maximum(2.0 * half, 1e-12), column("direction"))
+    excess = np.sqrt(np.maximum(half**2 - 2.0 * deviator**2, 0.0))  # noise alone widens half
+    psi = np.hypot(deviator / np.maximum(2.0 * excess, 1e-12), column("direction"))
     psi = np.where(void, VOID_DIRECTION, np.maximum(psi, 1e-9))
     even = (column("mean_curvature") ** 2 + deviator**2)[:, None]
     var_kappa = even + (column("curvature_scale")[:, None] * kappa) ** 2
@@ -312,7 +313,7 @@ def _inside_terms(m_n: Array, dm_n: Array) -> Terms:
 def _size_terms(readings: Readings, g: _Geometry) -> Terms:
     """Radius of each contact against the believed size; n contacts weigh as much as one."""
     mean, sd = readings.size
-    weight = 0.0 if np.isinf(sd) else 1.0 / (sd**2 * g.r.shape[1])
+    weight = 0.0 if np.isinf(sd) else 1.0 / (sd**2 * max(g.r.shape[1], 1))
     short = (g.r - mean)[:, :, None]
     slope = g.dr[:, :, None]
     return Terms(

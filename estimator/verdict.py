@@ -18,7 +18,7 @@ from estimator.likelihood import VOID_DIRECTION, Readings
 from estimator.modes import Peak
 from estimator.vectors import Array, basis_across, unit
 
-FREE = 0.35  # sd [rad], or [-] of the object's size, above which a motion of the axis is free
+FREE = 0.2  # sd [rad], or [-] of the object's size, above which a motion of the axis is free
 SURE = 0.95  # probability one hypothesis needs
 MENTIONED = 0.01  # probability from which a hypothesis matters
 FITS = 0.01  # p-value from which planes count as coincident
@@ -79,7 +79,7 @@ def _freedom_reasons(
     if not motions:
         return []
     normals = readings.n[0]
-    if len(motions) >= 2 and np.linalg.svd(normals - normals.mean(0))[1][0] < 0.1:
+    if np.linalg.svd(normals - normals.mean(0))[1][0] < 0.1:
         return [
             "all normals are parallel, as on a flat end: the axis may pass anywhere along them; "
             "touch the side"

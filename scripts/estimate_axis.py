@@ -82,7 +82,7 @@ def _print(estimate: AxisEstimate, count: int) -> None:
 
 def _hypotheses(estimate: AxisEstimate) -> Table:
     table = Table(box=SIMPLE_HEAD, pad_edge=False)
-    for heading in ("P", "through [mm]", "direction", "sd [deg]", "sd [mm]", "offset [deg]"):
+    for heading in ("P", "through, mm", "direction", "sd, deg", "sd, mm", "offset, deg"):
         table.add_column(heading, justify="right", no_wrap=True)
     for h in estimate.hypotheses[:5]:
         sd = np.sqrt(np.diag(h.covariance))

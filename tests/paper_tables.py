@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from estimator.axis import Axis
-from estimator.contact import measured_contact
 from estimator.planes import Labelling
+from estimator.records import contacts_from_record
 from estimator.sensors import sensor_noise
 from estimator.vectors import unit
 
@@ -31,19 +30,7 @@ def printed(name):
 
 def measured(name):
     """The contacts in SI, normalised and made orthogonal."""
-    noise = sensor_noise("robotworld")
-    if name == "table7":  # its curvatures are not printed: the direction noise is stated instead
-        noise = replace(noise, deviator=0.0)
-    return [
-        measured_contact(
-            np.array(c["position"]) * INCH,
-            np.array(c["normal"]),
-            np.array(c["directions"]),
-            np.array(c["curvatures"], float) / INCH,
-            noise,
-        )
-        for c in read(name)["contacts"]
-    ]
+    return list(contacts_from_record(read(name), sensor_noise("robotworld")))
 
 
 def true_axis(name):

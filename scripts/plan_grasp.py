@@ -1,0 +1,306 @@
+"""Plan three touches with a real hand, feel them, and find the axis of an unknown object.
+
+A coarse camera is rehearsed: it believes an axis, a radius and a height, all somewhat wrong. The
+hand plans three contacts it can make, touches the true object (which the planner never sees),
+estimates the axis with its uncertainty, and touches again until the goal is met.
+
+Writes plan.json (every placement with joint angles and approaches), result.json (estimate, truth,
+one entry per round) and probes.html (the animated hand, no server needed) into --out.
+
+Exit status: 0 goal met, 1 not met (and why), 2 bad input.
+
+Examples:
+    python scripts/plan_grasp.py
+    python scripts/plan_grasp.py --object bottle --sensor taxel --seed 3
+    python scripts/plan_grasp.py --object my_vase.csv --prior-angle-deg 30 --budget 20
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import tyro
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+
+from estimator.axis import Axis, angle_between, offset_at
+from estimator.belief import Belief, update
+from estimator.contact import Contact, Miss, SensorNoise
+from estimator.records import estimate_record
+from estimator.sensors import sensor_noise
+from estimator.surface import SurfaceOfRevolution
+from hand_models import HandError, load_hand
+from hand_models.hand import Hand
+from planner.explore import Step, explore
+from planner.goal import Goal
+from planner.messages import plan_document, step_record
+from planner.plan import NoPlan, Probe
+from sim_sensor.camera import coarse_view
+from sim_sensor.episode import Act, BelievedAxis, Episode
+from sim_sensor.noise import simulated_sensor
+from sim_sensor.objects import load_object
+from sim_sensor.view import write_page
+from sim_sensor.world import World
+
+
+@dataclass(frozen=True)
+class Options:
+    """Command line of plan_grasp.py."""
+
+    hand: str = "allegro_right"
+    """Hand: allegro_right, allegro_left, or the path of a description (.toml)."""
+    object: str = "can"
+    """What is touched: a built-in name (can, bottle, cone, cup, barrel, jar-lid, knob, vase,
+    paper-lathe, sphere) or a CSV file with columns r_mm,z_mm."""
+    sensor: str = "gel"
+    """Tactile sensor: ideal, fearing1988, robotworld, taxel, gel, gel-good, gel-poor."""
+    prior_angle_deg: float = 15.0
+    """How far the camera's axis is off in direction."""
+    prior_offset_mm: float = 15.0
+    """How far it is off in position, beside the object's middle."""
+    goal_angle_deg: float = 3.0
+    """Stop when the direction is known within this with 95 % probability ..."""
+    goal_offset_mm: float = 2.0
+    """... and the position within this."""
+    budget: int = 15
+    """Largest number of touches."""
+    seed: int = 0
+    """Of everything random: the object's pose, the camera's error, the sensor's noise."""
+    out: Path = Path("out")
+    """Folder for plan.json, result.json and probes.html."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """A true object and what is believed of it."""
+
+    surface: SurfaceOfRevolution
+    belief: Belief
+    told: SensorNoise
+    world: World
+    hand: Hand
+    goal: Goal
+
+
+def main() -> int:
+    options = tyro.cli(Options, description=__doc__)
+    console = Console()
+    try:
+        scenario = _scenario(options)
+        _require_writable(options.out)
+    except (ValueError, HandError) as error:
+        print(f"plan_grasp: {error}", file=sys.stderr)
+        return 2
+    steps: list[Step] = []
+    reason = ""
+    try:
+        for step in _rounds(scenario, options, console):
+            steps.append(step)
+            _print_round(console, step, len(steps))
+    except NoPlan as error:
+        reason = str(error)
+    return _conclude(console, scenario, options, steps, reason)
+
+
+def _scenario(options: Options) -> Scenario:
+    if not (np.isfinite(options.prior_angle_deg) and 0 < options.prior_angle_deg < 90):
+        raise ValueError(f"--prior-angle-deg: expected 0 to 90, got {options.prior_angle_deg}")
+    if not (np.isfinite(options.prior_offset_mm) and options.prior_offset_mm > 0):
+        raise ValueError(f"--prior-offset-mm: expected > 0, got {options.prior_offset_mm}")
+    if options.budget < 1:
+        raise ValueError(f"--budget: expected at least one touch, got {options.budget}")
+    if options.seed < 0:
+        raise ValueError(f"--seed: expected a number >= 0, got {options.seed}")
+    rng = np.random.default_rng(options.seed)
+    upright = Axis([0.5, 0.0, 0.2], [0.2 * rng.normal(), 0.2 * rng.normal(), 1.0])
+    surface = SurfaceOfRevolution(upright, load_object(options.object))
+    return Scenario(
+        surface=surface,
+        belief=coarse_view(
+            surface,
+            angle=np.deg2rad(options.prior_angle_deg),
+            offset=1e-3 * options.prior_offset_mm,
+            rng=rng,
+        ),
+        told=sensor_noise(options.sensor),
+        world=World(surface, simulated_sensor(options.sensor).session(rng=rng), rng=rng),
+        hand=load_hand(options.hand),
+        goal=Goal(np.deg2rad(options.goal_angle_deg), 1e-3 * options.goal_offset_mm),
+    )
+
+
+def _require_writable(folder: Path) -> None:
+    """Before the work, not after it."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise ValueError(f"--out {folder}: cannot be written ({error.strerror})") from None
+
+
+def _rounds(scenario: Scenario, options: Options, console: Console) -> Iterator[Step]:
+    def touch(probe: Probe) -> Contact | Miss:
+        return scenario.world.touch(probe.approach)
+
+    steps = explore(
+        scenario.hand,
+        touch,
+        scenario.belief,
+        scenario.told,
+        goal=scenario.goal,
+        budget=options.budget,
+        rng=np.random.default_rng([options.seed, 1]),
+    )
+    while True:
+        with console.status("planning and touching ..."):
+            step = next(steps, None)
+        if step is None:
+            return
+        yield step
+
+
+def _print_round(console: Console, step: Step, number: int) -> None:
+    plan = step.plan
+    console.print(f"\n[bold]Round {number}[/]: {len(plan.probes)} touches in one placement")
+    table = Table(box=SIMPLE_HEAD, pad_edge=False)
+    for heading in ("finger", "meridian", "height", "reach residual", "felt"):
+        table.add_column(heading, justify="left" if heading == "finger" else "right")
+    for j, (probe, outcome) in enumerate(zip(plan.probes, step.outcomes, strict=True)):
+        table.add_row(
+            probe.finger,
+            f"{np.rad2deg(probe.place.theta) % 360:.0f} deg",
+            f"{1e3 * probe.place.z:+.0f} mm",
+            f"{1e6 * plan.reach.certificate.position_residuals[j]:.1f} um",
+            "nothing" if isinstance(outcome, Miss) else _felt(probe, outcome),
+        )
+    console.print(table)
+    if np.isfinite(plan.margin):
+        console.print(
+            f"  worst case of the best pair {np.rad2deg(plan.bound.angle):.1f} deg, margin "
+            f"{plan.margin:.2f} from: {plan.nearest}"
+        )
+    estimate = step.after.estimate
+    if estimate is not None:
+        console.print(
+            f"  [bold]{estimate.verdict}[/]: direction within "
+            f"{np.rad2deg(estimate.angle_95):.1f} deg, position within "
+            f"{1e3 * estimate.offset_95:.1f} mm (95 %); expected before "
+            f"{np.rad2deg(plan.angle):.1f} deg, {1e3 * plan.offset:.1f} mm rms"
+        )
+        if estimate.verdict != "determined":
+            for reason in estimate.reasons:
+                console.print(f"    {reason}")
+
+
+def _felt(probe: Probe, contact: Contact) -> str:
+    depth = float((probe.expected.position - contact.position) @ probe.expected.normal)
+    return f"{1e3 * abs(depth):.1f} mm {'farther' if depth > 0 else 'nearer'} than believed"
+
+
+def _conclude(
+    console: Console, scenario: Scenario, options: Options, steps: list[Step], reason: str
+) -> int:
+    belief = steps[-1].after if steps else scenario.belief
+    met = scenario.goal.met_by(belief)
+    truth = scenario.surface.axis
+    middle = _middle(scenario.surface)
+    error = {
+        "angle_deg": float(np.rad2deg(angle_between(belief.axis, truth))),
+        "offset_mm": 1e3 * offset_at(belief.axis, truth, middle),
+    }
+    console.print(
+        f"\n[bold]Estimate against truth[/] after {steps[-1].touches if steps else 0} touches: "
+        f"{error['angle_deg']:.2f} deg, {error['offset_mm']:.2f} mm off"
+    )
+    reason = "" if met else reason or f"budget spent: {scenario.goal.missing(belief)}"
+    result = {
+        "goal_met": met,
+        "reason": reason,
+        "verdict": belief.estimate.verdict if belief.estimate else "undetermined",
+        "touches": steps[-1].touches if steps else 0,
+        "estimate": estimate_record(belief.estimate) if belief.estimate else None,
+        "covariance": belief.covariance.tolist(),
+        "truth": {
+            "axis": {"point": truth.point.tolist(), "direction": truth.direction.tolist()},
+            "object": options.object,
+        },
+        "error": error,
+        "goal": {"angle_deg": options.goal_angle_deg, "offset_mm": options.goal_offset_mm},
+        "rounds": [step_record(step) for step in steps],
+    }
+    try:
+        plans = plan_document(scenario.hand, [step.plan for step in steps])
+        _write(options.out / "plan.json", json.dumps(plans, indent=1))
+        _write(options.out / "result.json", json.dumps(result, indent=1))
+        if steps:
+            write_page(options.out / "probes.html", scenario.hand, _episode(scenario, steps, error))
+    except OSError as failure:
+        print(f"plan_grasp: {options.out}: cannot be written ({failure})", file=sys.stderr)
+        return 2
+    console.print(f"Written: {options.out}/plan.json, result.json" + ", probes.html" * bool(steps))
+    if met:
+        console.print("[bold green]Goal met.[/]")
+        return 0
+    console.print(f"[bold red]Goal not met[/]: {reason}")
+    return 1
+
+
+def _middle(surface: SurfaceOfRevolution) -> np.ndarray:
+    return surface.axis.point + np.mean(surface.profile.z_range) * surface.axis.direction
+
+
+def _episode(scenario: Scenario, steps: list[Step], error: dict[str, float]) -> Episode:
+    """What the page plays: each touch with the belief just before and just after it."""
+    acts: list[Act] = []
+    for step in steps:
+        belief = step.before
+        for probe, outcome in zip(step.plan.probes, step.outcomes, strict=True):
+            after = update(belief, [outcome])
+            record = scenario.world.records[len(acts)]
+            acts.append(
+                Act(
+                    finger=probe.finger,
+                    path=probe.approach.path,
+                    bases=_poses(probe),
+                    stop=record.stop,
+                    outcome=outcome,
+                    before=BelievedAxis(belief.axis, belief.covariance),
+                    after=BelievedAxis(after.axis, after.covariance),
+                )
+            )
+            belief = after
+    conclusion = f"{error['angle_deg']:.2f} deg and {error['offset_mm']:.2f} mm from the truth"
+    return Episode(scenario.surface, tuple(acts), conclusion=conclusion)
+
+
+def _poses(probe: Probe) -> tuple[pin.SE3, ...]:
+    return tuple(probe.approach.bases)
+
+
+def _write(path: Path, text: str) -> None:
+    """Whole or not at all."""
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text + "\n")
+        os.chmod(temporary, 0o644)
+        os.replace(temporary, path)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            os.unlink(temporary)
+        raise
+
+
+if __name__ == "__main__":
+    sys.exit(main())

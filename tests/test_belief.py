@@ -1,0 +1,182 @@
+"""A belief takes touches and gives a belief: order does not matter, and it knows how sure it is."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimator.axis import Axis, angle_between, from_chart, to_chart
+from estimator.band import coarse_band
+from estimator.belief import Belief, coarse_belief, sample_objects, update
+from estimator.contact import Miss
+from estimator.prior import AxisPrior, coarse_prior
+from estimator.profile import barrel, cone, cylinder
+from estimator.sensors import SENSORS
+from estimator.surface import Place, SurfaceOfRevolution
+from sim_sensor.noise import simulated_sensor
+
+AXIS = Axis(np.array([0.4, 0.1, 0.2]), np.array([0.3, -0.2, 0.9]))
+PLACES = ((0.0, -0.02), (1.1, 0.003), (2.3, 0.02))
+
+
+def coarse(axis=AXIS, angle=15.0, offset=0.015):
+    prior = coarse_prior(
+        axis, angle=np.deg2rad(angle), offset=offset, radius=0.033, radius_sd=0.008
+    )
+    return coarse_belief(prior, (-0.05, 0.05))
+
+
+def touches(profile, noise="gel", rng=None, axis=AXIS):
+    surface = SurfaceOfRevolution(axis, profile)
+    if rng is None:
+        return [surface.contact(Place(t, z), SENSORS[noise]) for t, z in PLACES]
+    session = simulated_sensor(noise).session(rng=rng)
+    return [session.read(surface.at(np.array(t), np.array(z)), rng=rng) for t, z in PLACES]
+
+
+def test_touches_one_by_one_and_all_at_once_agree():
+    contacts = touches(barrel(0.033, 2.0, 0.1), rng=np.random.default_rng(1))
+    together = update(coarse(), contacts)
+    one_by_one = coarse()
+    for contact in contacts:
+        one_by_one = update(one_by_one, [contact])
+    np.testing.assert_allclose(one_by_one.axis.direction, together.axis.direction, atol=1e-9)
+    np.testing.assert_allclose(one_by_one.covariance, together.covariance, rtol=1e-9)
+    np.testing.assert_allclose(one_by_one.band.mean, together.band.mean, rtol=1e-9)
+
+
+def test_a_posterior_is_a_belief_and_sharper():
+    before = coarse()
+    after = update(before, touches(cone(0.033, 0.2, 0.1)))
+    assert isinstance(after, Belief)
+    assert np.linalg.det(after.covariance) < 1e-3 * np.linalg.det(before.covariance)
+    assert np.all(after.band.sd <= before.band.sd + 1e-12)
+    assert after.estimate is not None
+    assert after.estimate.verdict == "determined"
+
+
+def test_no_touch_at_all_leaves_the_prior():
+    after = update(coarse(), [])
+    np.testing.assert_allclose(to_chart(AXIS, after.axis), 0.0, atol=1e-6)
+    np.testing.assert_allclose(
+        np.diag(after.covariance), np.diag(coarse().covariance), rtol=0.1
+    )
+    assert after.estimate.verdict == "undetermined"
+
+
+def test_the_axis_keeps_the_sense_of_the_prior():
+    flipped = Axis(AXIS.point, -AXIS.direction)
+    contacts = touches(cone(0.033, 0.2, 0.1))
+    up, down = update(coarse(), contacts), update(coarse(flipped), contacts)
+    assert up.axis.direction @ AXIS.direction > 0.99
+    assert down.axis.direction @ AXIS.direction < -0.99
+    np.testing.assert_allclose(up.band.mean, down.band.mean[::-1], atol=2e-4)
+
+
+def test_covariance_in_the_flipped_chart_is_that_of_the_same_lines():
+    """Turning an axis over must not change which lines are likely."""
+    contacts = touches(barrel(0.033, 2.0, 0.1), rng=np.random.default_rng(4))
+    up = update(coarse(), contacts)
+    down = update(coarse(Axis(AXIS.point, -AXIS.direction)), contacts)
+    x = np.array([1e-4, -2e-4, 2e-3, 1e-3])
+    other = from_chart(up.axis, x)
+    y = to_chart(down.axis, other)
+    a = x @ np.linalg.solve(up.covariance, x)
+    b = y @ np.linalg.solve(down.covariance, y)
+    assert b == pytest.approx(a, rel=0.05)
+
+
+def test_the_band_learns_radius_and_slope_where_it_was_touched():
+    after = update(coarse(), touches(cone(0.033, 0.2, 0.1)))
+    z = np.array([-0.02, 0.003, 0.02])
+    r, dr, _ = after.band.profile.derivatives(z)
+    np.testing.assert_allclose(r, 0.033 + 0.2 * z, atol=1.5e-3)
+    np.testing.assert_allclose(dr, 0.2, atol=0.05)
+    ends, middle = after.band.sd[[0, -1]], after.band.sd[7]
+    assert np.all(ends > middle)
+
+
+def test_conditioning_a_band_is_exact_linear_gaussian():
+    """Against the textbook formula on a dense draw: mean and sd at the observed place."""
+    band = coarse_band(0.03, 0.005, (-0.05, 0.05))
+    told = band.conditioned(
+        np.array([0.01]), np.array([0.036]), np.array([0.1]),
+        r_sd=np.array([1e-3]), dr_sd=np.array([0.02]),
+    )  # fmt: skip
+    drawn = band.sample(200_000, rng=np.random.default_rng(0))
+    from scipy.interpolate import CubicSpline
+
+    spline = CubicSpline(band.z, drawn, axis=1, bc_type="natural")
+    misfit = ((spline(0.01) - 0.036) / 1e-3) ** 2 + ((spline(0.01, 1) - 0.1) / 0.02) ** 2
+    weight = np.exp(-0.5 * misfit)
+    effective = weight.sum() ** 2 / np.sum(weight**2)
+    mean = weight @ drawn / weight.sum()
+    assert effective > 500
+    np.testing.assert_allclose(told.mean, mean, atol=4 * told.sd.max() / np.sqrt(effective))
+
+
+def test_flat_ends_do_not_bend_the_profile():
+    surface = SurfaceOfRevolution(AXIS, cylinder(0.033, 0.1))
+    u = AXIS.direction
+    side = touches(cylinder(0.033, 0.1))
+    top = replace(
+        side[0], position=AXIS.point + 0.05 * u, normal=u, directions=surface.frame[:2],
+        curvatures=np.zeros(2),
+    )  # fmt: skip
+    after = update(coarse(), [*side, top])
+    assert np.all(np.abs(after.band.profile.derivatives(after.band.z)[1]) < 0.3)
+
+
+def test_a_miss_moves_the_axis_away_from_where_nothing_was():
+    toward = AXIS.point + 0.03 * np.cross(AXIS.direction, [1.0, 0, 0])
+    before = coarse()
+    after = update(before, [Miss(toward, 0.012)])
+    gap = np.linalg.norm(after.axis.foot(toward) - toward)
+    assert gap > np.linalg.norm(before.axis.foot(toward) - toward) + 5e-4
+
+
+def test_samples_scatter_as_the_belief_says():
+    after = update(coarse(), touches(barrel(0.033, 2.0, 0.1), "gel-poor"))
+    after = replace(after, hypotheses=after.hypotheses[:1])
+    drawn = sample_objects(after, 4000, rng=np.random.default_rng(0))
+    x = np.array(
+        [
+            to_chart(after.axis, Axis(a, u))
+            for a, u in zip(drawn.points, drawn.directions, strict=True)
+        ]
+    )
+    scale = np.sqrt(np.diag(after.covariance))
+    np.testing.assert_allclose(
+        np.cov(x.T) / np.outer(scale, scale), after.covariance / np.outer(scale, scale), atol=0.08
+    )
+
+
+@pytest.mark.parametrize("noise", ["gel", "taxel", "gel-poor"])
+def test_the_truth_lies_in_its_95_percent_regions(noise):
+    """100 noisy sessions with a wrong prior: coverage of angle and of the 4-dof ellipsoid."""
+    inside_angle, chi = [], []
+    for seed in range(100):
+        rng = np.random.default_rng(seed)
+        x = np.concatenate([0.0106 * rng.normal(size=2), 0.185 * rng.normal(size=2)])
+        after = update(coarse(from_chart(AXIS, x)), touches(barrel(0.033, 2.0, 0.1), noise, rng))
+        error = to_chart(after.axis, AXIS)
+        inside_angle.append(angle_between(after.axis, AXIS) < after.estimate.angle_95)
+        chi.append(error @ np.linalg.solve(after.covariance, error))
+    assert np.mean(inside_angle) > 0.90  # 95 % +- 2 sd of 100 runs
+    assert np.mean(np.array(chi) < 9.49) > 0.88
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "message"),
+    [
+        ("radius", -1.0, "radius: expected a length > 0"),
+        ("radius_sd", 0.0, "radius_sd: expected a length > 0"),
+        ("covariance", -np.eye(4), "positive eigenvalues"),
+        ("covariance", np.arange(16.0).reshape(4, 4), "symmetric"),
+        ("covariance", np.eye(3), r"shape \(4, 4\)"),
+    ],
+)
+def test_a_prior_that_is_none_is_refused(field, value, message):
+    good = {"axis": AXIS, "covariance": np.eye(4), "radius": 0.03, "radius_sd": 0.01}
+    with pytest.raises(ValueError, match=message):
+        AxisPrior(**(good | {field: value}))
