@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from estimator.vectors import Array, finite_array, frozen
 
@@ -78,11 +79,7 @@ class Contact:
         position = finite_array("contact position", self.position, (3,))
         normal = finite_array("contact normal", self.normal, (3,))
         directions = finite_array("contact directions", self.directions, (2, 3))
-        curvatures = frozen(self.curvatures)
-        if curvatures.shape != (2,) or np.any(np.isinf(curvatures)):
-            raise ValueError(
-                f"contact curvatures: expected two numbers, NaN where saturated, got {curvatures}"
-            )
+        curvatures = _curvature_pair(self.curvatures)
         _require_frame(np.vstack([normal, directions]))
         for name, value in (("position", position), ("normal", normal)):
             object.__setattr__(self, name, value)
@@ -147,7 +144,7 @@ def measured_contact(
     n = frame[0]
     tangent = frame[1:] - np.outer(frame[1:] @ n, n)
     left, _, right = np.linalg.svd(tangent, full_matrices=False)
-    return Contact(frozen(position), frozen(n), frozen(left @ right), curvatures, noise)
+    return Contact(position, frozen(n), frozen(left @ right), curvatures, noise)
 
 
 def require_distinct(contacts: Sequence[Contact], *, minimum: int) -> None:
@@ -163,6 +160,19 @@ def require_distinct(contacts: Sequence[Contact], *, minimum: int) -> None:
     i, j = np.nonzero(np.triu(gaps < 1e-9, k=1))
     if len(i):
         raise ValueError(f"contacts {i[0] + 1} and {j[0] + 1} are at one point: touch elsewhere")
+
+
+def _curvature_pair(values: ArrayLike) -> Array:
+    """Two numbers, NaN allowed, read-only."""
+    try:
+        curvatures = frozen(values)
+    except (TypeError, ValueError):
+        curvatures = frozen([np.inf])
+    if curvatures.shape != (2,) or np.any(np.isinf(curvatures)):
+        raise ValueError(
+            f"contact curvatures: expected two numbers, NaN where saturated, got {values!r}"
+        )
+    return curvatures
 
 
 def _require_frame(frame: Array) -> None:

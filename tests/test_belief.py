@@ -58,9 +58,7 @@ def test_a_posterior_is_a_belief_and_sharper():
 def test_no_touch_at_all_leaves_the_prior():
     after = update(coarse(), [])
     np.testing.assert_allclose(to_chart(AXIS, after.axis), 0.0, atol=1e-6)
-    np.testing.assert_allclose(
-        np.diag(after.covariance), np.diag(coarse().covariance), rtol=0.1
-    )
+    np.testing.assert_allclose(np.diag(after.covariance), np.diag(coarse().covariance), rtol=0.1)
     assert after.estimate.verdict == "undetermined"
 
 

@@ -1,0 +1,142 @@
+"""Files of measured contacts: units, rounding, saturation, one clear line where they are bad."""
+
+import copy
+import json
+
+import numpy as np
+import pytest
+
+from estimator.axis import Axis
+from estimator.fusion import estimate_axis
+from estimator.profile import barrel
+from estimator.records import contacts_from_record, estimate_record, read_contacts
+from estimator.sensors import SENSORS
+from estimator.surface import Place, SurfaceOfRevolution
+
+NOISE = SENSORS["gel"]
+
+
+def record(unit="mm", scale=1e3):
+    surface = SurfaceOfRevolution(Axis([0.1, 0.2, 0.3], [0.1, 0.2, 1.0]), barrel(0.03, 3.0, 0.1))
+    entries = []
+    for theta, z in ((0.0, -0.02), (1.2, 0.0), (2.3, 0.02)):
+        c = surface.contact(Place(theta, z), NOISE)
+        entries.append(
+            {
+                "position": (scale * c.position).tolist(),
+                "normal": c.normal.tolist(),
+                "directions": c.directions.tolist(),
+                "curvatures": (c.curvatures / scale).tolist(),
+            }
+        )
+    return {"unit": unit, "contacts": entries}
+
+
+@pytest.mark.parametrize(("unit", "scale"), [("m", 1.0), ("mm", 1e3), ("in", 1 / 0.0254)])
+def test_every_unit_gives_the_same_contacts(unit, scale):
+    contacts = contacts_from_record(record(unit, scale), NOISE)
+    same = contacts_from_record(record("m", 1.0), NOISE)
+    for a, b in zip(contacts, same, strict=True):
+        np.testing.assert_allclose(a.position, b.position, atol=1e-15)
+        np.testing.assert_allclose(a.curvatures, b.curvatures, rtol=1e-12)
+
+
+def test_an_estimate_survives_json():
+    estimate = estimate_axis(contacts_from_record(record(), NOISE))
+    told = json.loads(json.dumps(estimate_record(estimate), allow_nan=False))
+    assert set(told) >= {
+        "axis", "covariance", "labellings", "hypotheses", "verdict", "reasons"
+    }  # fmt: skip
+    np.testing.assert_allclose(told["axis"]["direction"], estimate.axis.direction)
+    assert np.shape(told["covariance"]) == (4, 4)
+    assert told["labellings"][0]["parallel_rows"] == [0, 0, 0]
+
+
+def test_null_is_a_saturated_curvature():
+    data = record()
+    data["contacts"][0]["curvatures"][1] = None
+    assert np.isnan(contacts_from_record(data, NOISE)[0].curvatures[1])
+
+
+def test_two_nulls_are_directions_without_magnitudes():
+    data = record()
+    for entry in data["contacts"]:
+        entry["curvatures"] = [None, None]
+    estimate = estimate_axis(contacts_from_record(data, NOISE))
+    assert not any("umbilic" in reason for reason in estimate.reasons)
+
+
+BAD = [
+    (("unit",), "feet", "unit: expected one of m, mm, in, got 'feet'"),
+    (("contacts",), {}, "contacts: expected a list"),
+    (("contacts", 1), [], "contact 2: expected an object"),
+    (("contacts", 1, "normal"), [0, 0, 0], "contact 2: normal: expected a unit vector"),
+    (("contacts", 1, "normal"), [0, 0, 2.0], "contact 2: normal: expected a unit vector"),
+    (("contacts", 1, "normal"), [0, 1], r"contact 2: normal: expected finite numbers of shape"),
+    (("contacts", 0, "position"), [0, float("nan"), 0], "contact 1: position: expected finite"),
+    (("contacts", 0, "position"), "here", "contact 1: position: expected numbers"),
+    (("contacts", 2, "directions"), [[1, 0, 0]], "contact 3: directions: expected finite"),
+    (("contacts", 2, "curvatures"), [1, "flat"], "contact 3: curvatures: expected two numbers"),
+    (("contacts", 2, "curvatures"), [1], "contact 3: curvatures: expected two numbers"),
+    (("contacts", 2, "curvatures"), [1, True], "contact 3: curvatures: expected two numbers"),
+]
+
+
+@pytest.mark.parametrize(("path", "value", "message"), BAD)
+def test_bad_fields_are_named(path, value, message):
+    data = copy.deepcopy(record())
+    where = data
+    for key in path[:-1]:
+        where = where[key]
+    where[path[-1]] = value
+    with pytest.raises(ValueError, match=message):
+        contacts_from_record(data, NOISE)
+
+
+def test_a_missing_field_is_named():
+    data = record()
+    del data["contacts"][1]["curvatures"]
+    with pytest.raises(ValueError, match="contact 2: curvatures: missing"):
+        contacts_from_record(data, NOISE)
+
+
+@pytest.mark.parametrize(("degrees", "fine"), [(2.5, True), (3.5, False)])
+def test_rounded_vectors_are_made_orthogonal_up_to_three_degrees(degrees, fine):
+    data = record()
+    entry = data["contacts"][0]
+    n, k = np.array(entry["normal"]), np.array(entry["directions"][0])
+    a = np.deg2rad(degrees)
+    entry["directions"][0] = (np.cos(a) * k + np.sin(a) * n).tolist()
+    if fine:
+        contact = contacts_from_record(data, NOISE)[0]
+        frame = np.vstack([contact.normal, contact.directions])
+        np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-12)
+    else:
+        with pytest.raises(ValueError, match=r"3.5 deg from orthogonal, rounding explains 3 deg"):
+            contacts_from_record(data, NOISE)
+
+
+def test_two_contacts_at_one_point_are_refused():
+    data = record()
+    data["contacts"][1]["position"] = data["contacts"][0]["position"]
+    with pytest.raises(ValueError, match="contacts 1 and 2 are at one point"):
+        contacts_from_record(data, NOISE)
+
+
+def test_a_single_contact_is_refused():
+    data = record()
+    data["contacts"] = data["contacts"][:1]
+    with pytest.raises(ValueError, match="at least 2 are needed, got 1"):
+        contacts_from_record(data, NOISE)
+
+
+def test_files_that_are_none_are_named(tmp_path):
+    with pytest.raises(ValueError, match=r"none\.json: cannot be read"):
+        read_contacts(tmp_path / "none.json", NOISE)
+    bad = tmp_path / "bad.json"
+    bad.write_text("{")
+    with pytest.raises(ValueError, match=r"bad\.json: not JSON"):
+        read_contacts(bad, NOISE)
+    bad.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ValueError, match=r"bad\.json: not JSON"):
+        read_contacts(bad, NOISE)
