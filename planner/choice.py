@@ -29,7 +29,7 @@ from estimator.surface import Geometry
 from estimator.vectors import Array, Index
 from planner.candidates import Candidates
 from planner.goal import Goal
-from planner.prospects import Prospects, prospects
+from planner.prospects import Prospects, prospects, with_earlier
 
 MARGIN = 0.08  # from every singularity, in nine of ten sampled objects
 DOUBTFUL_OBJECTS = 0.1
@@ -53,7 +53,8 @@ class Ranking:
         margin: From the nearest singularity in nine of ten objects [-]; infinite for fewer than
             three contacts.
         nearest: That singularity in words.
-        label_probability: That the labels come out right; NaN where it was not asked.
+        label_probability: That the labels come out right by these touches alone; NaN where that
+            was not asked, or earlier contacts help.
         hit: Share of the touches that land.
         rejected: How many candidates fell here, by reason.
     """
@@ -91,14 +92,15 @@ def rank(
     value, angle, offset = _expected_error(belief, landed, noise, goal)
     covariance = _believed_covariance(belief, place, noise)
     bound, best_bound = _pair_bound(candidates.theta, place, noise)
-    margins_at, nearest = _margins(landed)
+    margins_at, nearest = _margins(belief, landed, samples)
     cost = value + BOUND_WEIGHT * np.log(bound.angle / best_bound)
     kept = np.nonzero(margins_at >= margin)[0]
     order = kept[np.argsort(cost[kept], kind="stable")].astype(np.intp)
     short = order[:SHORT_LIST]
     probability = np.full(len(cost), np.nan)
-    probability[short] = _label_probability(belief, landed, short, noise)
-    cost[short] += MISLABEL_COST * (1.0 - probability[short])
+    if candidates.theta.shape[1] > 1 and not belief.contacts:
+        probability[short] = _label_probability(belief, landed, short, noise)
+        cost[short] += MISLABEL_COST * (1.0 - probability[short])
     order = np.concatenate([short[np.argsort(cost[short], kind="stable")], order[SHORT_LIST:]])
     return Ranking(
         order, cost, angle, offset, covariance, bound, margins_at, nearest, probability,
@@ -148,13 +150,20 @@ def _pair_bound(theta: Array, place: Geometry, noise: SensorNoise) -> tuple[Axis
     ), ideal
 
 
-def _margins(landed: Prospects) -> tuple[Array, tuple[str, ...]]:
-    """Margin that nine of ten sampled objects keep, and what it is kept from."""
-    N, m = landed.theta.shape[1:]
-    if m != 3:
+def _margins(
+    belief: Belief, landed: Prospects, samples: SampledObjects
+) -> tuple[Array, tuple[str, ...]]:
+    """Margin that nine of ten sampled objects keep, and what it is kept from.
+
+    Of the triple that the touches make together with the contacts there already are; with more
+    than three contacts in all no single triple has to be good.
+    """
+    N = landed.theta.shape[1]
+    earlier = np.array([c.position for c in belief.contacts]).reshape(-1, 3)
+    triples = with_earlier(landed, samples, earlier)
+    if triples is None:
         return np.full(N, np.inf), ("",) * N
-    values = margins(landed.triples).values  # (B, N, K)
-    low = np.quantile(values, DOUBTFUL_OBJECTS, axis=0)
+    low = np.quantile(margins(triples).values, DOUBTFUL_OBJECTS, axis=0)  # (N, K)
     nearest = np.argmin(low, axis=1)
     return low.min(axis=1), tuple(SINGULARITIES[k].words for k in nearest)
 

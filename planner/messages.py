@@ -6,7 +6,7 @@ probes are those of `plan_record` and `probe_record` below.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, SupportsFloat
 
 import numpy as np
 import pinocchio as pin
@@ -43,7 +43,7 @@ def plan_record(plan: Plan) -> dict[str, Any]:
             "object_clearance": reach.object_clearance,
             "solver": reach.solver,
         },
-        "bound": {"angle": plan.bound.angle, "position": _finite(plan.bound.position)},
+        "bound": {"angle": float(plan.bound.angle), "position": _finite(plan.bound.position)},
         "expected_error": {"angle": plan.angle, "offset": plan.offset},
         "predicted_covariance": plan.covariance.tolist(),
         "margin": _finite(plan.margin),
@@ -113,6 +113,7 @@ def pose_record(X: pin.SE3) -> dict[str, list[float]]:
     }
 
 
-def _finite(value: float) -> float | None:
+def _finite(value: SupportsFloat) -> float | None:
     """JSON has no infinity and no NaN: null says that there is no such number."""
-    return float(value) if np.isfinite(value) else None
+    value = float(value)
+    return value if np.isfinite(value) else None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from typing import Literal, get_args
 
 import numpy as np
 import pinocchio as pin
@@ -26,6 +27,7 @@ from planner.solid import RevolvedSolid
 from planner.starts import Start
 
 Funnel = tuple[tuple[str, int], ...]
+Criterion = Literal["default", "random"]
 
 SOLID_HEIGHTS = 101
 
@@ -41,6 +43,8 @@ class PlannerOptions:
         placements: How many postures are laid onto the believed surface.
         objects: How many objects are drawn from the belief.
         tries: How many of the best placements are handed to the optimiser.
+        criterion: "default" ranks (`planner.choice`); "random" takes what the hand reaches in no
+            order and refuses nothing: the peer that benchmarks compare with.
     """
 
     reach: ReachOptions = field(default_factory=lambda: ReachOptions(starts=0, rescues=1))
@@ -49,10 +53,14 @@ class PlannerOptions:
     placements: int = 1200
     objects: int = 12
     tries: int = 24
+    criterion: Criterion = "default"
 
     def __post_init__(self) -> None:
         if self.fingers_at_once not in (1, 2, 3):
             raise ValueError(f"fingers_at_once: expected 1, 2 or 3, got {self.fingers_at_once}")
+        if self.criterion not in get_args(Criterion):
+            known = ", ".join(get_args(Criterion))
+            raise ValueError(f"criterion {self.criterion!r} is unknown; known are {known}")
         for name in ("placements", "objects", "tries"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name}: expected at least 1, got {getattr(self, name)}")
@@ -182,7 +190,10 @@ def _best_placement(
     if len(candidates) == 0:
         return funnel
     samples = sample_objects(belief, options.objects, rng=rng)
-    ranking = rank(candidates, belief, samples, sensor, goal, margin=options.margin)
+    margin = options.margin if options.criterion == "default" else 0.0
+    ranking = rank(candidates, belief, samples, sensor, goal, margin=margin)
+    if options.criterion == "random":
+        ranking = replace(ranking, order=rng.permutation(len(candidates)))
     funnel += tuple((f"{count} fingers: singular: {words}", n) for words, n in ranking.rejected)
     solid = _solid(belief.surface)
     failures: dict[str, int] = {}

@@ -86,5 +86,35 @@ def _on_object(
     g = surface.at(theta, inside)
     return (
         (g.p, g.n, g.k_theta, g.k_z, g.kappa_theta, g.kappa_z),
-        (theta, inside, r, dr, ddr, hit),
+        (theta, inside, r, dr, ddr, hit.astype(np.float64)),
     )
+
+
+def with_earlier(landed: Prospects, samples: SampledObjects, p_W: Array) -> PlacedTriples | None:
+    """Triples of earlier contacts and candidates together, where that makes three, (B, N, 3).
+
+    Args:
+        p_W: Positions of the earlier contacts, (k, 3) [m].
+    Returns:
+        None unless k earlier contacts and the m new ones are three.
+    """
+    B, N, m = landed.theta.shape
+    k = len(p_W)
+    if k + m != 3:
+        return None
+    if k == 0:
+        return landed.triples
+    earlier = [_known_places(samples, b, p_W) for b in range(B)]
+    columns = []
+    for name, new in zip(PlacedTriples._fields, landed.triples, strict=True):
+        known = np.array([getattr(places, name) for places in earlier])  # (B, k)
+        columns.append(np.concatenate([np.repeat(known[:, None], N, axis=1), new], axis=-1))
+    return PlacedTriples(*columns)
+
+
+def _known_places(samples: SampledObjects, b: int, p_W: Array) -> PlacedTriples:
+    profile = SplineProfile(samples.z, samples.radii[b])
+    surface = SurfaceOfRevolution(Axis(samples.points[b], samples.directions[b]), profile)
+    theta, _, z = surface.cylindrical(p_W)
+    z = np.clip(z, *profile.z_range)
+    return PlacedTriples(theta, z, *profile.derivatives(z))

@@ -15,7 +15,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-import umsgpack  # type: ignore[import-untyped]
+import umsgpack
 
 from hand_models.hand import Hand
 from sim_sensor import scene as colours
