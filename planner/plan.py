@@ -13,7 +13,7 @@ from estimator.belief import Belief, sample_objects
 from estimator.bounds import AxisBound
 from estimator.contact import Contact, SensorNoise
 from estimator.surface import Place, SurfaceOfRevolution
-from estimator.vectors import Array
+from estimator.vectors import Array, frozen
 from hand_models.hand import Hand
 from hand_models.postures import Postures, posture_library
 from hand_models.spheres import LinkSpheres, link_spheres
