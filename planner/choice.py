@@ -178,7 +178,7 @@ def _label_probability(
     b, c = (x.ravel() for x in np.meshgrid(objects, chosen, indexing="ij"))
 
     def pick(x: Array) -> Array:
-        return x.reshape(B, N, m, *x.shape[2:])[b, c]
+        return np.asarray(x.reshape(B, N, m, *x.shape[2:])[b, c])
 
     geometry = Geometry(*(pick(x) for x in vars(landed.geometry).values()))
     expected = Expected(geometry, landed.points[b], landed.directions[b])

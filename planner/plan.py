@@ -284,7 +284,9 @@ def _plan(
     return Plan(
         probes=tuple(probes),
         reach=reach,
-        bound=AxisBound(float(ranking.pair_bound.position[i]), float(ranking.pair_bound.angle[i])),
+        bound=AxisBound(
+            frozen(ranking.pair_bound.position[i]), frozen(ranking.pair_bound.angle[i])
+        ),
         covariance=ranking.covariance[i],
         angle=float(ranking.angle[i]),
         offset=float(ranking.offset[i]),

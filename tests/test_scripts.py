@@ -1,0 +1,153 @@
+"""The commands people type: they work, say what they did, and refuse bad input in one line."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+DATA = ROOT / "tests" / "data"
+
+
+def script(name, *arguments):
+    return subprocess.run(
+        [sys.executable, str(ROOT / "scripts" / f"{name}.py"), *map(str, arguments)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def refused(done, message):
+    assert done.returncode == 2, done.stdout + done.stderr
+    assert message in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert "Traceback" not in done.stderr
+
+
+@pytest.fixture(scope="module")
+def main_job(tmp_path_factory):
+    out = tmp_path_factory.mktemp("main")
+    return script("plan_grasp", "--out", out), out
+
+
+def test_the_main_job_meets_its_goal_and_writes_everything(main_job):
+    done, out = main_job
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "Goal met" in done.stdout
+    assert sorted(p.name for p in out.iterdir()) == ["plan.json", "probes.html", "result.json"]
+
+
+def test_result_json_has_the_documented_fields(main_job):
+    _, out = main_job
+    result = json.loads((out / "result.json").read_text())
+    assert result["goal_met"] is True
+    assert result["verdict"] == "determined"
+    assert result["touches"] == sum(len(r["outcomes"]) for r in result["rounds"])
+    assert set(result["error"]) == {"angle_deg", "offset_mm"}
+    assert result["error"]["angle_deg"] < 5.0
+    assert len(result["covariance"]) == 4
+    assert set(result["truth"]["axis"]) == {"point", "direction"}
+    assert result["estimate"]["verdict"] == "determined"
+
+
+def test_plan_json_has_joint_angles_by_name_and_an_approach_for_each_probe(main_job):
+    _, out = main_job
+    plan = json.loads((out / "plan.json").read_text())
+    assert plan["joint_names"][0] == "joint_0.0"
+    for placement in plan["rounds"]:
+        assert len(placement["joint_positions"]) == len(plan["joint_names"])
+        for probe in placement["probes"]:
+            path = probe["approach"]["joint_path"]
+            assert all(len(q) == len(plan["joint_names"]) for q in path)
+            assert 0 < probe["approach"]["contact_index"] < len(path) - 1
+            assert len(probe["approach"]["tip_path"]) == len(path)
+
+
+def test_a_goal_out_of_budget_ends_with_one_and_says_why(tmp_path):
+    done = script("plan_grasp", "--goal-angle-deg", 0.01, "--budget", 3, "--out", tmp_path)
+    assert done.returncode == 1, done.stderr
+    result = json.loads((tmp_path / "result.json").read_text())
+    assert result["goal_met"] is False
+    assert "budget spent: direction within" in result["reason"]
+
+
+def test_a_sphere_is_never_claimed_to_be_known(tmp_path):
+    done = script("plan_grasp", "--object", "sphere", "--budget", 6, "--out", tmp_path)
+    assert done.returncode == 1
+    result = json.loads((tmp_path / "result.json").read_text())
+    assert result["verdict"] == "undetermined"
+    assert "umbilic" in result["reason"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--hand", "claw"), "claw"),
+        (("--object", "teapot"), "teapot"),
+        (("--sensor", "nose"), "sensor 'nose' is unknown; known are ideal"),
+        (("--goal-angle-deg", "0"), "goal angle"),
+        (("--goal-offset-mm", "-1"), "goal offset"),
+        (("--prior-angle-deg", "120"), "--prior-angle-deg: expected 0 to 90"),
+        (("--prior-offset-mm", "nan"), "--prior-offset-mm: expected > 0"),
+        (("--budget", "0"), "--budget: expected at least one touch"),
+        (("--seed", "-1"), "--seed: expected a number >= 0"),
+    ],
+)
+def test_bad_options_are_refused_and_nothing_is_written(arguments, message, tmp_path):
+    out = tmp_path / "out"
+    refused(script("plan_grasp", "--out", out, *arguments), message)
+    assert not out.exists()
+
+
+def test_output_that_cannot_be_written_is_refused_before_the_work(tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    refused(script("plan_grasp", "--out", blocked / "out"), "cannot be written")
+
+
+def test_a_profile_that_folds_back_is_refused(tmp_path):
+    csv = tmp_path / "fold.csv"
+    csv.write_text("r_mm,z_mm\n30,0\n31,10\n32,5\n33,20\n34,30\n")
+    refused(script("plan_grasp", "--object", csv, "--out", tmp_path / "out"), "fold")
+
+
+def test_estimate_axis_reads_the_papers_table():
+    done = script("estimate_axis", DATA / "table8.json", "--json")
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert told["verdict"] == "determined"
+    assert told["labellings"][0]["probability"] > 0.99
+
+
+def test_estimate_axis_prints_a_table_for_people():
+    done = script("estimate_axis", DATA / "table8.json", "--only", 1, 5, 8, 9)
+    assert done.returncode == 0, done.stderr
+    assert "Axes that explain the contacts" in done.stdout
+
+
+def test_estimate_axis_refuses_what_it_cannot_read(tmp_path):
+    refused(script("estimate_axis", tmp_path / "none.json"), "none.json: cannot be read")
+    refused(script("estimate_axis", DATA / "table8.json", "--only", 13), "--only 13")
+    refused(script("estimate_axis", DATA / "table8.json", "--sensor", "nose"), "known are")
+
+
+def test_benchmark_runs(tmp_path):
+    lines = tmp_path / "runs.jsonl"
+    done = script(
+        "benchmark", "--runs", 1, "--objects", "can", "--settings", "coarse", "--out", lines
+    )
+    assert done.returncode == 0, done.stderr
+    runs = [json.loads(line) for line in lines.read_text().splitlines()]
+    assert [run["criterion"] for run in runs] == ["default", "random"]
+
+
+@pytest.mark.parametrize("name", ["plan_grasp", "estimate_axis", "benchmark"])
+def test_help_teaches(name):
+    done = script(name, "--help")
+    assert done.returncode == 0
+    assert "Example" in done.stdout
+    assert len(done.stdout.splitlines()) > 25
