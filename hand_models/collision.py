@@ -39,14 +39,19 @@ class ObjectClearance:
     """Distances between a hand and an object, negative where they overlap.
 
     Attributes:
-        link: Name of the link nearest to the object, pads left out.
-        distance: Its distance [m].
+        links: Names of the links that have a shape, one per shape, pads left out.
+        distances: Their distances [m].
         pads: (F,) distance of each finger's pad sphere; zero for a pad that touches [m].
     """
 
-    link: str
-    distance: float
+    links: tuple[str, ...]
+    distances: Array
     pads: Array
+
+    def nearest(self) -> tuple[str, float]:
+        """Name and distance of the link nearest to the object, pads left out [m]."""
+        i = int(np.argmin(self.distances))
+        return self.links[i], float(self.distances[i])
 
 
 class HandCollision:
@@ -102,10 +107,9 @@ class HandCollision:
         )
         X_BO = X_WB.inverse() * X_WO
         distances = np.array([self._to_object(i, slices, X_BO) for i in range(self._shapes.ngeoms)])
-        pads = distances[list(self._pad_ids)]
-        distances[list(self._pad_ids)] = np.inf
-        nearest = int(np.argmin(distances))
-        return ObjectClearance(self._link(nearest), float(distances[nearest]), pads)
+        links = [i for i in range(self._shapes.ngeoms) if i not in self._pad_ids]
+        names = tuple(self._link(i) for i in links)
+        return ObjectClearance(names, distances[links], distances[list(self._pad_ids)])
 
     def _to_object(self, shape: int, slices: Sequence[coal.ConvexBase], X_BO: pin.SE3) -> float:
         geometry = self._shapes.geometryObjects[shape].geometry

@@ -6,7 +6,8 @@ surface are covered when they are less than the slack outside a sphere. Centres 
 from a grid, the points that few spheres can cover (edges, corners) first, and then thinned.
 Both errors are therefore bounded by construction: the spheres stand out by at most the overhang,
 and the hull stands out of the spheres by at most the slack (up to
-0.5 mm more between the sampled points).
+0.5 mm more between the sampled points). Only beside a pad the overhang gives way, so that it is
+the pad that touches a plane in front of it.
 """
 
 from __future__ import annotations
@@ -27,7 +28,8 @@ Array = NDArray[np.float64]
 _GRID = 4e-3  # between candidate centres [m]
 _SAMPLE = 2.5e-3  # mean distance of the surface points to be covered [m]
 _THINNEST = 2e-3  # a centre is at least this deep in its link [m]
-_VERSION = 1  # of the algorithm; part of the cache's key
+_FRONT = np.radians(20.0)  # about a pad's normal, where no overhang may stand before the pad
+_VERSION = 2  # of the algorithm; part of the cache's key
 _FIELDS = ("joints", "centres", "radii", "link_indices", "finger_indices", "is_pad")
 
 
@@ -86,21 +88,21 @@ def link_spheres(hand: Hand, *, overhang: float = 3e-3, slack: float = 2e-3) -> 
 
 
 def _cover_hand(hand: Hand, overhang: float, slack: float) -> dict[str, NDArray[np.generic]]:
-    pads = {pad_in_joint(hand, f)[0]: i for i, f in enumerate(hand.fingers)}
+    pads: dict[int, _Pad] = {}
     columns: list[tuple[int, Array, float, int, int, bool]] = []
     for i, finger in enumerate(hand.fingers):
-        joint, centre, _ = pad_in_joint(hand, finger)
+        joint, centre, normal = pad_in_joint(hand, finger)
+        pads[joint] = _Pad(i, centre, normal, finger.pad_radius)
         columns.append((joint, centre, finger.pad_radius, finger.tip_frame_id, i, True))
-    pad_spheres = {c[0]: (c[1], c[2]) for c in columns}
     done: dict[bytes, tuple[Array, Array]] = {}  # fingers repeat the same links
     for index, shape in enumerate(hand.visual_model.geometryObjects):
         joint, points = int(shape.parentJoint), link_points(hand, index)
-        pad = pad_spheres.get(joint)
-        key = points.tobytes() + (b"" if pad is None else pad[0].tobytes())
+        pad = pads.get(joint)
+        key = points.tobytes() + (b"" if pad is None else pad.centre.tobytes())
         if key not in done:
             done[key] = _cover_link(points, overhang, slack, pad)
         for centre, radius in zip(*done[key], strict=True):
-            finger_index = pads.get(joint, -1)
+            finger_index = -1 if pad is None else pad.finger_index
             columns.append(
                 (joint, centre, float(radius), int(shape.parentFrame), finger_index, False)
             )
@@ -109,19 +111,38 @@ def _cover_hand(hand: Hand, overhang: float, slack: float) -> dict[str, NDArray[
     return {name: np.asarray(value) for name, value in zip(_FIELDS, values, strict=True)}
 
 
+@dataclass(frozen=True, eq=False)
+class _Pad:
+    """A pad in its joint's frame."""
+
+    finger_index: int
+    centre: Array
+    normal: Array
+    radius: float
+
+    def room(self, points: Array) -> Array:
+        """Largest radii with which spheres stay behind the planes the pad is to touch."""
+        offset = points - self.centre
+        length = np.maximum(np.linalg.norm(offset, axis=1), 1e-9)
+        angle = np.arccos(np.clip(offset @ self.normal / length, -1.0, 1.0))
+        return np.asarray(self.radius - length * np.cos(np.maximum(angle - _FRONT, 0.0)))
+
+
 def _cover_link(
-    points: Array, overhang: float, slack: float, pad: tuple[Array, float] | None
+    points: Array, overhang: float, slack: float, pad: _Pad | None
 ) -> tuple[Array, Array]:
     """Centres (K, 3) and radii (K,) for one link's points; what the pad covers is left to it."""
     hull = ConvexHull(points)
     surface = _surface_points(points, hull)
     if pad is not None:
-        surface = surface[np.linalg.norm(surface - pad[0], axis=1) > pad[1] + slack]
+        surface = surface[np.linalg.norm(surface - pad.centre, axis=1) > pad.radius + slack]
     centres = _grid_points(points)
     depth = -(centres @ hull.equations[:, :3].T + hull.equations[:, 3]).max(axis=1)
     # A plate thinner than the grid still gets its middle layer, if a thin one.
     deep = depth > min(_THINNEST, 0.5 * float(depth.max()))
-    centres, radii = centres[deep], depth[deep] + overhang
+    centres, depth, radii = centres[deep], depth[deep], depth[deep] + overhang
+    if pad is not None:
+        radii = np.minimum(radii, np.maximum(depth, pad.room(centres)))
     distance = np.linalg.norm(surface[:, None] - centres, axis=2)
     chosen = _greedy_cover(distance <= radii + slack)
     return centres[chosen], radii[chosen]

@@ -133,7 +133,7 @@ def test_pads_keep_the_distance_of_a_cylinder_wall(hand: Hand) -> None:
     centres_O = np.array([X_WO.actInv(p) for p in hand.at(hand.middle, X_WB).pad_centres])
     expected = np.hypot(centres_O[:, 0], centres_O[:, 1]) - 0.03 - 0.012
     np.testing.assert_allclose(clearance.pads, expected, atol=3e-5)
-    assert clearance.distance > 0.05
+    assert clearance.nearest()[1] > 0.05
 
 
 def test_a_link_inside_the_object_has_negative_clearance_and_is_named(hand: Hand) -> None:
@@ -141,8 +141,9 @@ def test_a_link_inside_the_object_has_negative_clearance_and_is_named(hand: Hand
     slices = revolved_slices([-0.01, 0.0, 0.01], [0.004, 0.005, 0.004])
     X_WO = at * pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.027]))
     found = HandCollision(hand).object_clearance(hand.middle, pin.SE3.Identity(), slices, X_WO)
-    assert found.link == "link_1.0"
-    assert found.distance < -0.01
+    link, distance = found.nearest()
+    assert link == "link_1.0"
+    assert distance < -0.01
 
 
 @pytest.mark.parametrize(

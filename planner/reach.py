@@ -1,0 +1,229 @@
+"""Put the hand's pads on given contacts: joint angles and a base pose, certified, or a reason.
+
+Starts (the caller's, then the library's) go through a fast SQP one by one; the first whose solution
+passes the independent check is returned. If none does, the most promising go through Ipopt.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hand_models.collision import HandCollision
+from hand_models.hand import Hand
+from hand_models.spheres import link_spheres
+from planner.certificate import Certificate, Tolerances, certify, faults
+from planner.reach_model import ReachModel
+from planner.reach_outcome import Reach, Unreachable
+from planner.reach_task import ReachOptions, ReachTask, Solution, solve_task
+from planner.solid import RevolvedSolid
+from planner.starts import Start, StartSearch
+
+__all__ = ["Reach", "ReachOptions", "ReachSolver", "Unreachable"]
+
+Array = NDArray[np.float64]
+
+_UNIT_TOLERANCE = 1e-6
+_HOPELESS = 4e-3  # violation beyond which no certificate is needed: 0.2 mm
+
+
+class ReachSolver:
+    """Reaches for one hand. Problems are written down once per set of fingers and kept.
+
+    Args:
+        hand: The hand.
+        options: Rules and effort.
+    """
+
+    def __init__(self, hand: Hand, options: ReachOptions | None = None) -> None:
+        self.hand = hand
+        self.options = ReachOptions() if options is None else options
+        self._spheres = link_spheres(hand)
+        self._collision = HandCollision(hand)
+        self._models: dict[tuple[tuple[int, ...], bool], ReachModel] = {}
+
+    @cached_property
+    def _search(self) -> StartSearch:
+        return StartSearch(self.hand, self._spheres)
+
+    def solve(
+        self,
+        points: ArrayLike,
+        normals: ArrayLike,
+        solid: RevolvedSolid,
+        *,
+        fingers: Sequence[str] | None = None,
+        starts: Sequence[Start] = (),
+        motion: bool = True,
+    ) -> Reach | Unreachable:
+        """Find a hand pose that makes the contacts.
+
+        Args:
+            points: (k, 3) surface points, one to three, in the world [m].
+            normals: (k, 3) outward unit normals there.
+            solid: The believed object; links stay out of it.
+            fingers: The finger of each contact; None tries all assignments.
+            starts: Guesses to try before those of the library.
+            motion: Ask for stand-off and overshoot by the fingers alone, the base held. Without,
+                an arm must bring the hand (`approach_by_base`).
+
+        Raises:
+            ValueError: Shapes, lengths of normals, or a finger used twice.
+            HandError: A finger the hand has not.
+        """
+        task = ReachTask(*_contacts(points, normals), solid, self.options)
+        named = None if fingers is None else self._checked_fingers(fingers, len(task.points))
+        failed: list[Solution] = []
+        used: list[Start] = []
+        for start in self._starts(task, named, starts):
+            outcome = self._attempt(task, start, "sqp", motion, len(failed) + 1)
+            if isinstance(outcome, Reach):
+                return outcome
+            failed.append(outcome)
+            used.append(start)
+        nearest = sorted(range(len(failed)), key=lambda i: failed[i].violation)
+        for i in nearest[: self.options.rescues]:
+            outcome = self._attempt(task, used[i], "ipopt", motion, len(failed) + 1)
+            if isinstance(outcome, Reach):
+                return outcome
+            failed.append(outcome)
+        return self._unreachable(task, failed)
+
+    def _starts(
+        self, task: ReachTask, fingers: tuple[str, ...] | None, given: Sequence[Start]
+    ) -> Iterator[Start]:
+        """The caller's starts, then those of the library, which are only looked up if needed."""
+        for start in given:
+            if fingers is None or start.fingers == fingers:
+                yield start
+        if self.options.starts == 0:
+            return
+        names = None if fingers is None else tuple(self._index(name) for name in fingers)
+        radius = self.hand.fingers[0].pad_radius if names is None else self._radii(names)
+        yield from self._search.find(
+            task.points + np.reshape(radius, (-1, 1)) * task.normals,
+            task.normals,
+            task.solid,
+            fingers=names,
+            workspace=self.options.workspace,
+            count=self.options.starts,
+        )
+
+    def _attempt(
+        self, task: ReachTask, start: Start, solver: str, motion: bool, tried: int
+    ) -> Reach | Solution:
+        """One start through one solver; a solution that is not good enough comes back as it is.
+
+        The contact alone comes first: ten times cheaper, it settles most starts that lead nowhere.
+        """
+        fingers = tuple(sorted(self._index(name) for name in start.fingers))
+        solution = solve_task(self._model(fingers, False), task, start, solver=solver)
+        if motion and solution.violation < _HOPELESS and self._collision.is_self_free(solution.q):
+            contact = Start(start.fingers, solution.q, solution.X_WB)
+            solution = solve_task(self._model(fingers, True), task, contact, solver=solver)
+        if not solution.violation < _HOPELESS:
+            return solution
+        at, before = self._certificates(task, solution)
+        if any(self._faults(task, solution, at, before)):
+            return solution
+        return Reach(
+            fingers=solution.fingers,
+            q=_frozen(solution.q),
+            q_standoff=_frozen(solution.q_standoff),
+            q_overshoot=_frozen(solution.q_overshoot),
+            X_WB=solution.X_WB,
+            standoff=_frozen(solution.standoff),
+            overshoot=_frozen(solution.overshoot),
+            points=task.points,
+            normals=task.normals,
+            certificate=at,
+            before=before,
+            solver=solver,
+            tried=tried,
+        )
+
+    def _certificates(self, task: ReachTask, found: Solution) -> tuple[Certificate, Certificate]:
+        """Of the contact and of the stand-off; without motion the two are one."""
+        away = found.standoff[:, None] * task.normals
+
+        def of(q: Array, points: Array) -> Certificate:
+            return certify(
+                self.hand,
+                self._collision,
+                q,
+                found.X_WB,
+                task.solid,
+                fingers=found.fingers,
+                points=points,
+                normals=task.normals,
+            )
+
+        at = of(found.q, task.points)
+        return at, of(found.q_standoff, task.points + away) if np.any(away) else at
+
+    def _faults(
+        self, task: ReachTask, found: Solution, at: Certificate, before: Certificate
+    ) -> Iterator[str]:
+        options = self.options
+        allowed = Tolerances(
+            position=options.position_tolerance,
+            cone=options.cone,
+            self_clearance=options.self_clearance,
+            object_clearance=options.clearance,
+            pad_depth=options.pad_depth,
+        )
+        yield from faults(self.hand, at, found.q, found.fingers, allowed)
+        if before is not at:
+            wide = replace(allowed, cone=options.off_contact_cone)
+            for fault in faults(self.hand, before, found.q_standoff, found.fingers, wide):
+                yield f"at stand-off: {fault}"
+
+    def _unreachable(self, task: ReachTask, failed: list[Solution]) -> Unreachable:
+        if not failed:
+            return Unreachable("no start was given and none was to be looked up", (), (), 0)
+        nearest = min(failed, key=lambda solution: solution.violation)
+        found = tuple(self._faults(task, nearest, *self._certificates(task, nearest)))
+        reason = found[0] if found else "the optimiser stopped short of a solution"
+        return Unreachable(reason, found, nearest.fingers, len(failed))
+
+    def _model(self, fingers: tuple[int, ...], motion: bool) -> ReachModel:
+        key = (fingers, motion)
+        if key not in self._models:
+            self._models[key] = ReachModel(self.hand, self._spheres, fingers, motion=motion)
+        return self._models[key]
+
+    def _checked_fingers(self, fingers: Sequence[str], contacts: int) -> tuple[str, ...]:
+        for name in fingers:
+            self.hand.finger(name)
+        if len(fingers) != contacts or len(set(fingers)) != contacts:
+            raise ValueError(
+                f"fingers must name {contacts} different fingers, one per contact, got {fingers}"
+            )
+        return tuple(fingers)
+
+    def _index(self, name: str) -> int:
+        return self.hand.fingers.index(self.hand.finger(name))
+
+    def _radii(self, fingers: tuple[int, ...]) -> Array:
+        return np.array([self.hand.fingers[i].pad_radius for i in fingers])
+
+
+def _contacts(points: ArrayLike, normals: ArrayLike) -> tuple[Array, Array]:
+    p, n = _frozen(points), _frozen(normals)
+    if p.ndim != 2 or p.shape != n.shape or p.shape[1] != 3 or not 1 <= len(p) <= 3:
+        raise ValueError(f"points and normals must be (k, 3), k 1 to 3, got {p.shape}, {n.shape}")
+    if not np.isfinite(p).all():
+        raise ValueError("points must be finite")
+    if not np.all(np.abs(np.linalg.norm(n, axis=1) - 1.0) < _UNIT_TOLERANCE):
+        raise ValueError("normals must be unit vectors")
+    return p, n
+
+
+def _frozen(values: ArrayLike) -> Array:
+    array = np.array(values, dtype=np.float64)
+    array.setflags(write=False)
+    return array
