@@ -141,21 +141,22 @@ def faults(
         yield f"a joint is {-found.limit_margin:.3f} rad beyond its limit"
     pair = found.self_pair
     if pair.distance < allowed.self_clearance:
-        yield f"{pair.first} and {pair.second} {_gap(pair.distance)}"
+        yield gap_in_words(pair)
     for (link, distance), least in (
         (found.links, allowed.object_clearance),
         (found.tip_links, -_TOUCH),
     ):
         if distance < least:
-            yield f"{link} and the object {_gap(distance)}"
+            yield gap_in_words(LinkPair(link, "the object", distance))
     for name, depth in zip(fingers, -found.pads, strict=True):
         if depth > allowed.pad_depth:
             yield f"the pad of {name} is {1e3 * depth:.1f} mm too round for its hollow"
 
 
-def _gap(distance: float) -> str:
-    word = "overlap by" if distance < 0.0 else "are only apart by"
-    return f"{word} {1e3 * abs(distance):.1f} mm"
+def gap_in_words(pair: LinkPair) -> str:
+    """E.g. "link_2.0 and link_6.0 overlap by 1.3 mm"."""
+    word = "overlap by" if pair.distance < 0.0 else "are only apart by"
+    return f"{pair.first} and {pair.second} {word} {1e3 * abs(pair.distance):.1f} mm"
 
 
 def _at_limits(hand: Hand, q: Array, finger: str) -> str:

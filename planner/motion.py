@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from hand_models.collision import HandCollision
 from hand_models.hand import Finger, Hand
 from planner.reach import Reach
 
@@ -20,6 +21,8 @@ Array = NDArray[np.float64]
 
 SPACING = 2e-3  # between waypoints, at most [m]
 ARM_STROKE = 0.03  # before and behind the contact, where the arm moves [m]
+_OFF_LINE = 2e-4  # of the pad's centre, where an overshoot ends [m]
+_JUMP = 0.2  # of a joint between waypoints, likewise [rad]
 _DAMPING = 1e-6  # of the inverse kinematics [m^2]
 _ITERATIONS = 8
 
@@ -55,8 +58,11 @@ def plan_approaches(hand: Hand, reach: Reach) -> tuple[Approach, ...]:
 
     The finger follows the line through its contact along the normal by damped least squares from
     the reach's own stand-off, contact and overshoot postures; the others wait at their stand-offs.
+    The overshoot ends early where the pad would leave the line, the joints would jump, or links
+    would meet: `overshoot` says how far it goes.
     """
-    return tuple(_finger_approach(hand, reach, i) for i in range(len(reach.fingers)))
+    collision = HandCollision(hand)
+    return tuple(_finger_approach(hand, reach, i, collision) for i in range(len(reach.fingers)))
 
 
 def approach_by_base(hand: Hand, reach: Reach, *, stroke: float = ARM_STROKE) -> Approach:
@@ -79,7 +85,7 @@ def approach_by_base(hand: Hand, reach: Reach, *, stroke: float = ARM_STROKE) ->
     )  # fmt: skip
 
 
-def _finger_approach(hand: Hand, reach: Reach, i: int) -> Approach:
+def _finger_approach(hand: Hand, reach: Reach, i: int, collision: HandCollision) -> Approach:
     finger = hand.finger(reach.fingers[i])
     before, behind = float(reach.standoff[i]), float(reach.overshoot[i])
     along, contact = _stations(before, behind)
@@ -92,10 +98,21 @@ def _finger_approach(hand: Hand, reach: Reach, i: int) -> Approach:
         path[k] = _pull(hand, finger, reach.X_WB, path[k], line[k])
     row = hand.fingers.index(finger)
     tips = np.array([hand.at(q, reach.X_WB).pad_centres[row] for q in path])
+    off_line = np.linalg.norm(tips - line, axis=1)
+    end = _end(path, off_line, contact, collision)
     return Approach(
-        finger.name, _frozen(path), (reach.X_WB,), _frozen(tips), finger.pad_radius, contact,
-        before, behind, float(np.linalg.norm(tips - line, axis=1).max()),
+        finger.name, _frozen(path[:end]), (reach.X_WB,), _frozen(tips[:end]), finger.pad_radius,
+        contact, before, float(-along[end - 1]), float(off_line[:end].max()),
     )  # fmt: skip
+
+
+def _end(path: Array, off_line: Array, contact: int, collision: HandCollision) -> int:
+    """Number of waypoints to keep: all up to the contact, and those behind it that hold."""
+    for k in range(contact + 1, len(path)):
+        jump = np.abs(path[k] - path[k - 1]).max()
+        if off_line[k] > _OFF_LINE or jump > _JUMP or not collision.is_self_free(path[k]):
+            return k
+    return len(path)
 
 
 def _stations(before: float, behind: float) -> tuple[Array, int]:

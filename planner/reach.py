@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from hand_models.collision import HandCollision
 from hand_models.hand import Hand
 from hand_models.spheres import link_spheres
-from planner.certificate import Certificate, Tolerances, certify, faults
+from planner.certificate import Certificate, Tolerances, certify, faults, gap_in_words
 from planner.reach_model import ReachModel
 from planner.reach_outcome import Reach, Unreachable
 from planner.reach_task import ReachOptions, ReachTask, Solution, solve_task
@@ -28,6 +28,7 @@ __all__ = ["Reach", "ReachOptions", "ReachSolver", "Unreachable"]
 Array = NDArray[np.float64]
 
 _UNIT_TOLERANCE = 1e-6
+_PRESSING = (0.0, 0.25, 0.5, 0.75, 1.0)  # shares of the overshoot that are checked
 _HOPELESS = 4e-3  # violation beyond which no certificate is needed: 0.2 mm
 
 
@@ -177,10 +178,27 @@ class ReachSolver:
             pad_depth=options.pad_depth,
         )
         yield from faults(self.hand, at, found.q, found.fingers, allowed)
-        if before is not at:
-            wide = replace(allowed, cone=options.off_contact_cone)
-            for fault in faults(self.hand, before, found.q_standoff, found.fingers, wide):
-                yield f"at stand-off: {fault}"
+        if before is at:
+            return
+        wide = replace(allowed, cone=options.off_contact_cone)
+        for fault in faults(self.hand, before, found.q_standoff, found.fingers, wide):
+            yield f"at stand-off: {fault}"
+        yield from self._pressing_faults(found)
+
+    def _pressing_faults(self, found: Solution) -> Iterator[str]:
+        """One finger presses on behind its contact while the others wait at their stand-offs.
+
+        The object is no obstacle then: if it were where it is believed, the finger had stopped.
+        """
+        for name in found.fingers:
+            joints = self.hand.finger(name).q_indices
+            for share in _PRESSING:
+                q = found.q_standoff.copy()
+                q[joints] = (1.0 - share) * found.q[joints] + share * found.q_overshoot[joints]
+                pair = self._collision.self_clearance(q)
+                if pair.distance < self.options.self_clearance:
+                    yield f"{name} beyond its contact: {gap_in_words(pair)}"
+                    break
 
     def _unreachable(self, task: ReachTask, failed: list[Solution]) -> Unreachable:
         if not failed:
