@@ -32,12 +32,9 @@ class Goal:
     def met_by(self, belief: Belief) -> bool:
         """Determined, and sure enough of direction and position."""
         estimate = belief.estimate
-        return (
-            estimate is not None
-            and estimate.verdict == "determined"
-            and estimate.angle_95 <= self.angle
-            and estimate.offset_95 <= self.offset
-        )
+        if estimate is None or estimate.verdict != "determined":
+            return False
+        return bool(estimate.angle_95 <= self.angle and estimate.offset_95 <= self.offset)
 
     def missing(self, belief: Belief) -> str:
         """What is missing, in words; empty where the goal is met."""

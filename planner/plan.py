@@ -51,7 +51,7 @@ class PlannerOptions:
     fingers_at_once: int = 3
     margin: float = MARGIN
     placements: int = 1200
-    objects: int = 12
+    objects: int = 20
     tries: int = 24
     criterion: Criterion = "default"
 

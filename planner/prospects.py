@@ -17,7 +17,7 @@ from estimator.singular import PlacedTriples
 from estimator.surface import Geometry, SurfaceOfRevolution
 from estimator.vectors import Array, Mask
 
-STROKE = 0.025  # how far before and beyond the expected contact an approach goes [m]
+BEFORE, BEHIND = 0.030, 0.025  # how far an approach goes, about the expected contact [m]
 RIM = 0.02  # of the height at each end where a touch does not count as one of the wall
 
 
@@ -76,12 +76,12 @@ def _on_object(
         r, dr, _ = profile.derivatives(np.clip(z, low, high))
         rad = np.column_stack([np.cos(theta), np.sin(theta)]) @ surface.frame[:2]
         slope = -np.sum(n * rad, axis=1) + dr * (n @ surface.axis.direction)
-        s = np.clip(s - (rho - r) / np.minimum(slope, -0.2), -1.5 * STROKE, 1.5 * STROKE)
+        s = np.clip(s - (rho - r) / np.minimum(slope, -0.2), -1.5 * BEFORE, 1.5 * BEHIND)
     theta, rho, z = surface.cylindrical(p - s[:, None] * n)
     inset = RIM * (high - low)
     inside = np.clip(z, low, high)
     r, dr, ddr = profile.derivatives(inside)
-    hit = (np.abs(rho - r) < 5e-4) & (np.abs(s) < STROKE)
+    hit = (np.abs(rho - r) < 5e-4) & (s > -BEFORE) & (s < BEHIND)
     hit &= (z > low + inset) & (z < high - inset)
     g = surface.at(theta, inside)
     return (

@@ -31,6 +31,7 @@ from rich.table import Table
 from estimator.axis import Axis, angle_between, offset_at
 from estimator.belief import Belief
 from estimator.contact import Contact, Miss
+from estimator.likelihood import UMBILIC
 from estimator.sensors import sensor_noise
 from estimator.singular import placed_triples, singularities
 from estimator.surface import SurfaceOfRevolution
@@ -148,7 +149,7 @@ def _first_three(
         touch,
         belief,
         sensor_noise(sensor),
-        goal=Goal(np.deg2rad(0.01), 1e-6),
+        goal=Goal(np.deg2rad(3.0), 2e-3),
         budget=9,
         rng=np.random.default_rng([seed, 1]),
         options=PlannerOptions(criterion=criterion),
@@ -189,9 +190,14 @@ def _judge(
 
 
 def _label_right(record: TouchRecord, row_0: float) -> bool:
-    """Whether the row believed to be the parallel's is the one nearer to the true parallel."""
+    """Whether the row believed to be the parallel's is the one nearer to the true parallel.
+
+    A flat end or an umbilic has no directions, so nothing there can be taken wrongly.
+    """
     assert isinstance(record.outcome, Contact)
     assert record.truth is not None
+    if record.outcome.umbilicity < UMBILIC:
+        return True
     nearer = int(np.argmax(np.abs(record.outcome.directions @ record.truth.k_theta)))
     return (row_0 > 0.5) == (nearer == 0)
 

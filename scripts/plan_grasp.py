@@ -196,7 +196,7 @@ def _print_round(console: Console, step: Step, number: int) -> None:
             f"  [bold]{estimate.verdict}[/]: direction within "
             f"{np.rad2deg(estimate.angle_95):.1f} deg, position within "
             f"{1e3 * estimate.offset_95:.1f} mm (95 %); expected before "
-            f"{np.rad2deg(plan.angle):.1f} deg, {1e3 * plan.offset:.1f} mm rms"
+            f"{np.rad2deg(plan.angle):.1f} deg, {1e3 * plan.offset:.1f} mm"
         )
         if estimate.verdict != "determined":
             for reason in estimate.reasons:
@@ -239,10 +239,11 @@ def _conclude(
         "goal": {"angle_deg": options.goal_angle_deg, "offset_mm": options.goal_offset_mm},
         "rounds": [step_record(step) for step in steps],
     }
+    plans = json.dumps(plan_document(scenario.hand, [step.plan for step in steps]), indent=1)
+    told = json.dumps(result, indent=1, allow_nan=False)
     try:
-        plans = plan_document(scenario.hand, [step.plan for step in steps])
-        _write(options.out / "plan.json", json.dumps(plans, indent=1))
-        _write(options.out / "result.json", json.dumps(result, indent=1))
+        _write(options.out / "plan.json", plans)
+        _write(options.out / "result.json", told)
         if steps:
             write_page(options.out / "probes.html", scenario.hand, _episode(scenario, steps, error))
     except OSError as failure:

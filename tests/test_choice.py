@@ -15,7 +15,7 @@ from estimator.surface import Place, SurfaceOfRevolution
 from planner.candidates import Candidates
 from planner.choice import rank
 from planner.goal import Goal
-from planner.prospects import STROKE, prospects
+from planner.prospects import BEFORE, BEHIND, prospects
 
 AXIS = Axis(np.array([0.5, 0.1, 0.2]), np.array([0.1, -0.2, 0.9]))
 GOAL = Goal(np.deg2rad(3.0), 2e-3)
@@ -110,7 +110,8 @@ def test_approaches_land_on_the_sampled_objects_and_on_their_line():
     off_line = np.linalg.norm(place.p - along[..., None] * place.n - p, axis=-1)
     assert landed.hit.sum() > 12
     assert np.all(off_line[landed.hit] < 2e-3)
-    assert np.all(np.abs(along[landed.hit]) < STROKE + 1e-3)
+    assert np.all(along[landed.hit] < BEHIND + 1e-3)
+    assert np.all(along[landed.hit] > -BEFORE - 1e-3)
 
 
 def test_earlier_contacts_count_towards_the_triple():
