@@ -47,4 +47,3 @@ def batch_pads(hand: Hand, q: Array) -> BatchPads:
 
 def _pads(hand: Hand) -> list[tuple[int, Array, Array]]:
     return [pad_in_joint(hand, finger) for finger in hand.fingers]
-

@@ -1,0 +1,20 @@
+"""Where to touch: contacts that this hand can make, chosen by what they would tell."""
+
+from planner.explore import Step, explore
+from planner.goal import Goal
+from planner.plan import NoPlan, Plan, PlannerOptions, Probe, plan_probes
+from planner.reach_task import ReachOptions
+from planner.workspace import Workspace
+
+__all__ = [
+    "Goal",
+    "NoPlan",
+    "Plan",
+    "PlannerOptions",
+    "Probe",
+    "ReachOptions",
+    "Step",
+    "Workspace",
+    "explore",
+    "plan_probes",
+]
