@@ -257,7 +257,12 @@ def _made(
     start = Start(names, candidates.q[i], candidates.base(i))
     several = len(names) > 1
     reach = tools.solver.solve(
-        place.p, place.n, solid, fingers=names, starts=[start], motion=several
+        place.p,
+        place.n,
+        solid,
+        fingers=names,
+        starts=[start],
+        motion="fingers" if several else "arm",
     )
     if isinstance(reach, Unreachable):
         return reach.reason

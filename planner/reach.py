@@ -7,7 +7,6 @@ passes the independent check is returned. If none does, the most promising go th
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -16,8 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from hand_models.collision import HandCollision
 from hand_models.hand import Hand
 from hand_models.spheres import link_spheres
-from planner.certificate import Certificate, Tolerances, certify, faults, gap_in_words
-from planner.reach_model import ReachModel
+from planner.inspection import inspect
+from planner.reach_model import Motion, ReachModel
 from planner.reach_outcome import Reach, Unreachable
 from planner.reach_task import ReachOptions, ReachTask, Solution, solve_task
 from planner.solid import RevolvedSolid
@@ -28,7 +27,6 @@ __all__ = ["Reach", "ReachOptions", "ReachSolver", "Unreachable"]
 Array = NDArray[np.float64]
 
 _UNIT_TOLERANCE = 1e-6
-_PRESSING = (0.0, 0.25, 0.5, 0.75, 1.0)  # shares of the overshoot that are checked
 _HOPELESS = 4e-3  # violation beyond which no certificate is needed: 0.2 mm
 
 
@@ -45,7 +43,7 @@ class ReachSolver:
         self.options = ReachOptions() if options is None else options
         self._spheres = link_spheres(hand)
         self._collision = HandCollision(hand)
-        self._models: dict[tuple[tuple[int, ...], bool], ReachModel] = {}
+        self._models: dict[tuple[tuple[int, ...], Motion], ReachModel] = {}
 
     @cached_property
     def _search(self) -> StartSearch:
@@ -59,7 +57,7 @@ class ReachSolver:
         *,
         fingers: Sequence[str] | None = None,
         starts: Sequence[Start] = (),
-        motion: bool = True,
+        motion: Motion = "fingers",
     ) -> Reach | Unreachable:
         """Find a hand pose that makes the contacts.
 
@@ -69,8 +67,8 @@ class ReachSolver:
             solid: The believed object; links stay out of it.
             fingers: The finger of each contact; None tries all assignments.
             starts: Guesses to try before those of the library.
-            motion: Ask for stand-off and overshoot by the fingers alone, the base held. Without,
-                an arm must bring the hand (`approach_by_base`).
+            motion: "fingers": they alone reach stand-off and overshoot, the base held; "arm": it
+                retreats the hand along the mean normal, the way kept clear; "none": contact only.
 
         Raises:
             ValueError: Shapes, lengths of normals, or a finger used twice.
@@ -115,21 +113,21 @@ class ReachSolver:
         )
 
     def _attempt(
-        self, task: ReachTask, start: Start, solver: str, motion: bool, tried: int
+        self, task: ReachTask, start: Start, solver: str, motion: Motion, tried: int
     ) -> Reach | Solution:
         """One start through one solver; a solution that is not good enough comes back as it is.
 
         The contact alone comes first: ten times cheaper, it settles most starts that lead nowhere.
         """
         fingers = tuple(sorted(self._index(name) for name in start.fingers))
-        solution = solve_task(self._model(fingers, False), task, start, solver=solver)
-        if motion and solution.violation < _HOPELESS and self._collision.is_self_free(solution.q):
+        solution = solve_task(self._model(fingers, "none"), task, start, solver=solver)
+        if solution.violation < _HOPELESS and self._collision.is_self_free(solution.q):
             contact = Start(start.fingers, solution.q, solution.X_WB)
-            solution = solve_task(self._model(fingers, True), task, contact, solver=solver)
+            solution = solve_task(self._model(fingers, motion), task, contact, solver=solver)
         if not solution.violation < _HOPELESS:
             return solution
-        at, before = self._certificates(task, solution)
-        if any(self._faults(task, solution, at, before)):
+        found = inspect(self.hand, self._collision, task, solution)
+        if found.faults:
             return solution
         return Reach(
             fingers=solution.fingers,
@@ -137,78 +135,26 @@ class ReachSolver:
             q_standoff=_frozen(solution.q_standoff),
             q_overshoot=_frozen(solution.q_overshoot),
             X_WB=solution.X_WB,
+            retreat=_frozen(solution.retreat),
             standoff=_frozen(solution.standoff),
             overshoot=_frozen(solution.overshoot),
             points=task.points,
             normals=task.normals,
-            certificate=at,
-            before=before,
+            certificate=found.at,
+            before=found.before,
             solver=solver,
             tried=tried,
         )
-
-    def _certificates(self, task: ReachTask, found: Solution) -> tuple[Certificate, Certificate]:
-        """Of the contact and of the stand-off; without motion the two are one."""
-        away = found.standoff[:, None] * task.normals
-
-        def of(q: Array, points: Array) -> Certificate:
-            return certify(
-                self.hand,
-                self._collision,
-                q,
-                found.X_WB,
-                task.solid,
-                fingers=found.fingers,
-                points=points,
-                normals=task.normals,
-            )
-
-        at = of(found.q, task.points)
-        return at, of(found.q_standoff, task.points + away) if np.any(away) else at
-
-    def _faults(
-        self, task: ReachTask, found: Solution, at: Certificate, before: Certificate
-    ) -> Iterator[str]:
-        options = self.options
-        allowed = Tolerances(
-            position=options.position_tolerance,
-            cone=options.cone,
-            self_clearance=options.self_clearance,
-            object_clearance=options.clearance,
-            pad_depth=options.pad_depth,
-        )
-        yield from faults(self.hand, at, found.q, found.fingers, allowed)
-        if before is at:
-            return
-        wide = replace(allowed, cone=options.off_contact_cone)
-        for fault in faults(self.hand, before, found.q_standoff, found.fingers, wide):
-            yield f"at stand-off: {fault}"
-        yield from self._pressing_faults(found)
-
-    def _pressing_faults(self, found: Solution) -> Iterator[str]:
-        """One finger presses on behind its contact while the others wait at their stand-offs.
-
-        The object is no obstacle then: if it were where it is believed, the finger had stopped.
-        """
-        for name in found.fingers:
-            joints = self.hand.finger(name).q_indices
-            for share in _PRESSING:
-                q = found.q_standoff.copy()
-                q[joints] = (1.0 - share) * found.q[joints] + share * found.q_overshoot[joints]
-                pair = self._collision.self_clearance(q)
-                if pair.distance < self.options.self_clearance:
-                    yield f"{name} beyond its contact: {gap_in_words(pair)}"
-                    break
 
     def _unreachable(self, task: ReachTask, failed: list[Solution]) -> Unreachable:
         if not failed:
             return Unreachable("no start was given and none was to be looked up", (), (), 0)
         nearest = min(failed, key=lambda solution: solution.violation)
-        found = tuple(self._faults(task, nearest, *self._certificates(task, nearest)))
+        found = inspect(self.hand, self._collision, task, nearest).faults
         reason = found[0] if found else "the optimiser stopped short of a solution"
         return Unreachable(reason, found, nearest.fingers, len(failed))
 
-    def _model(self, fingers: tuple[int, ...], motion: bool) -> ReachModel:
+    def _model(self, fingers: tuple[int, ...], motion: Motion) -> ReachModel:
         key = (fingers, motion)
         if key not in self._models:
             self._models[key] = ReachModel(self.hand, self._spheres, fingers, motion=motion)

@@ -1,7 +1,8 @@
 """The optimiser's problem: one hand, some of its fingers, each pad on its contact.
 
-Unknown: all joints q and the base pose; with motion also, for each finger that touches, its joints
-at a stand-off before the contact and at an overshoot behind it, and both distances. Written down
+Unknown: all joints q and the base pose; if the fingers are to move also, for each that touches, its
+joints at a stand-off before the contact and at an overshoot behind it, and both distances. If an
+arm is to move, the way of the whole hand to the stand-off is kept clear instead. Written down
 once per set of fingers; contacts, object, base and cone are parameters.
 
     minimise    |(q - middle) / range|^2 + 0.05 |s|^2 + shortfall of both distances + price slack
@@ -24,6 +25,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import casadi as ca
 import numpy as np
@@ -37,7 +39,7 @@ from planner.solid import PARAMETERS, RevolvedSolid, signed_distance
 
 Array = NDArray[np.float64]
 
-_LARGEST_MRP = 0.6  # of the base's turn from its start: 124 degrees
+_RETREATED = (0.5, 1.0)  # shares of an arm's retreat at which the hand is kept out of the object
 _TURN_WEIGHT = 0.05
 _KNOT_WEIGHT = 0.1  # stand-off and overshoot postures need not be central
 _SHORTFALL_WEIGHT = 5.0
@@ -69,18 +71,26 @@ _IPOPT_OPTIONS = {
 }
 
 
+Motion = Literal["none", "fingers", "arm"]
+"""What retreats to the stand-off: nothing, the fingers with the base held, or the base."""
+
+
 @dataclass(frozen=True)
 class Shape:
-    """Sizes of the problem: joints, fingers that touch, their joints, and whether it moves."""
+    """Sizes of the problem: joints, fingers that touch, their joints, and what moves."""
 
     nq: int
     contacts: int
     moving: tuple[int, ...]  # joint indices of the touching fingers, finger by finger
-    motion: bool
+    motion: Motion
+
+    @property
+    def by_fingers(self) -> bool:
+        return self.motion == "fingers"
 
     @property
     def unknowns(self) -> int:
-        extra = 2 * len(self.moving) + 2 * self.contacts if self.motion else 0
+        extra = 2 * len(self.moving) + 2 * self.contacts if self.by_fingers else 0
         return 7 + self.nq + extra
 
 
@@ -91,11 +101,11 @@ class ReachModel:
         hand: The hand.
         spheres: Its links for the optimiser.
         fingers: Indices of the fingers that touch, in the order of the contacts.
-        motion: Whether to find stand-off and overshoot too.
+        motion: What retreats to the stand-off.
     """
 
     def __init__(
-        self, hand: Hand, spheres: LinkSpheres, fingers: tuple[int, ...], *, motion: bool
+        self, hand: Hand, spheres: LinkSpheres, fingers: tuple[int, ...], *, motion: Motion
     ) -> None:
         self.hand, self.spheres, self.fingers = hand, spheres, fingers
         moving = tuple(int(i) for f in fingers for i in hand.fingers[f].q_indices)
@@ -119,7 +129,7 @@ class ReachModel:
         w, p = Unknowns(shape), Parameters(shape)
         base = (w.x, w.s, p.R_start, p.T_start)
         postures = [(w.q, p.radii, p.cone)]
-        if shape.motion:
+        if shape.by_fingers:
             postures.append((w.q_standoff, p.radii + w.standoff * LENGTH, p.wide_cone))
             postures.append((w.q_overshoot, p.radii - w.overshoot * LENGTH, p.wide_cone))
         equal, cones = [], []
@@ -129,8 +139,12 @@ class ReachModel:
             equal.append(ca.vec(centres - target) / LENGTH)
             cones.append((-ca.sum1(normals * p.normals) - cone).T)
         clearances = [self._clearance(w.q, base, p, pads=False)]
-        if shape.motion:
+        if shape.by_fingers:
             clearances.append(self._clearance(w.q_standoff, base, p, pads=True))
+        if shape.motion == "arm":
+            for share in _RETREATED:
+                away = (w.x + share * p.retreat / LENGTH, *base[1:])
+                clearances.append(self._clearance(w.q, away, p, pads=False))
         R = turned(w.s, p.R_start)
         turn = (ca.trace(p.R_nominal.T @ R) - 1) / 2 - p.least_cosine
         gap = ca.vertcat(*equal)
@@ -162,11 +176,11 @@ class Unknowns:
     def __init__(self, shape: Shape) -> None:
         self.vector = ca.MX.sym("w", shape.unknowns)
         n, m, k = shape.nq, len(shape.moving), shape.contacts
-        ends = np.cumsum([0, 1, 3, 3, n] + ([m, m, k, k] if shape.motion else [])).tolist()
+        ends = np.cumsum([0, 1, 3, 3, n] + ([m, m, k, k] if shape.by_fingers else [])).tolist()
         slack, *parts = ca.vertsplit(self.vector, ends)
         self.slack = slack
         self.x, self.s, self.q = parts[:3]
-        if shape.motion:
+        if shape.by_fingers:
             self.q_standoff = _with_joints(self.q, shape.moving, parts[3])
             self.q_overshoot = _with_joints(self.q, shape.moving, parts[4])
             self.standoff, self.overshoot = parts[5], parts[6]
@@ -177,7 +191,7 @@ class Parameters:
 
     def __init__(self, shape: Shape) -> None:
         k = shape.contacts
-        sizes = [3 * k, 3 * k, k, 9, 3, 9, 1, 1, 1, 1, 4, PARAMETERS]
+        sizes = [3 * k, 3 * k, k, 9, 3, 9, 1, 1, 1, 1, 3, 4, PARAMETERS]
         self.vector = ca.MX.sym("p", sum(sizes))
         parts = ca.vertsplit(self.vector, np.cumsum([0, *sizes]).tolist())
         self.points, self.normals = (ca.reshape(part, 3, k) for part in parts[:2])
@@ -185,7 +199,7 @@ class Parameters:
         self.R_start, self.T_start = ca.reshape(parts[3], 3, 3), parts[4]
         self.R_nominal, self.least_cosine = ca.reshape(parts[5], 3, 3), parts[6]
         self.cone, self.wide_cone, self.clearance = parts[7:10]
-        self.table, self.solid = parts[10], parts[11]
+        self.retreat, self.table, self.solid = parts[10:]
 
 
 def pack_parameters(
@@ -196,6 +210,7 @@ def pack_parameters(
     nominal: pin.SE3,
     cosines: tuple[float, float, float],
     clearance: float,
+    retreat: Array,
     table: Array,
     solid: RevolvedSolid,
 ) -> Array:
@@ -207,6 +222,7 @@ def pack_parameters(
         start, nominal: Base poses: the start, and the middle of the base's range.
         cosines: Of the base's range of rotation, of the cone, and of the cone off the contact.
         clearance: Between link spheres and object or table [m].
+        retreat: (3,) way of an arm from the contact to the stand-off [m].
         table: (4,) n, h of the half-space n . p >= h the hand must stay in.
         solid: The object.
     """
@@ -218,6 +234,7 @@ def pack_parameters(
         start.translation,
         nominal.rotation.ravel(order="F"),
         [*cosines, clearance],
+        retreat,
         table,
         solid.parameters,
     )
@@ -231,7 +248,7 @@ def _cost(hand: Hand, w: Unknowns, shape: Shape) -> ca.MX:
         return ca.sumsqr((q - hand.middle) / span)
 
     cost = _SLACK_WEIGHT * w.slack + central(w.q) + _TURN_WEIGHT * ca.sumsqr(w.s)
-    if shape.motion:
+    if shape.by_fingers:
         cost += _KNOT_WEIGHT * (central(w.q_standoff) + central(w.q_overshoot))
         cost -= _SHORTFALL_WEIGHT * (ca.sum1(w.standoff) + ca.sum1(w.overshoot))
     return cost

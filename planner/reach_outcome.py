@@ -20,14 +20,15 @@ class Reach:
     Attributes:
         fingers: The finger of each contact.
         q: (nq,) joint positions with all pads on their contacts.
-        q_standoff: (nq,) the touching fingers retreated, the hand base where it is.
+        q_standoff: (nq,) the touching fingers retreated, the hand base where it is; q if it is for
+            an arm to move.
         q_overshoot: (nq,) the touching fingers beyond their contacts.
         X_WB: Pose of the hand base.
-        standoff, overshoot: (k,) distances of those postures from the contact; zero when the
-            motion was not asked for [m].
+        retreat: (3,) way of the base to the stand-off; zero if the fingers move [m].
+        standoff, overshoot: (k,) distances of stand-off and overshoot from the contact [m].
         points, normals: (k, 3) the contacts.
         certificate: Of q; position residual, pad angle, limits, clearances.
-        before: Of q_standoff, its residuals against the stand-off points.
+        before: At the stand-off, its residuals against the stand-off points.
         solver: "sqp" or "ipopt".
         tried: Number of starts tried, this one included.
     """
@@ -37,6 +38,7 @@ class Reach:
     q_standoff: Array
     q_overshoot: Array
     X_WB: pin.SE3
+    retreat: Array
     standoff: Array
     overshoot: Array
     points: Array

@@ -83,6 +83,12 @@ class ReachTask:
     solid: RevolvedSolid
     options: ReachOptions
 
+    @property
+    def retreat(self) -> Array:
+        """(3,) way of an arm from the contact to the stand-off, along the mean normal [m]."""
+        normal = self.normals.mean(axis=0)
+        return np.asarray(self.options.standoff * normal / max(np.linalg.norm(normal), 1e-9))
+
 
 @dataclass(frozen=True, eq=False)
 class Solution:
@@ -92,6 +98,7 @@ class Solution:
         fingers: The finger of each contact.
         q, q_standoff, q_overshoot: (nq,) at the contact, before and behind it.
         X_WB: Pose of the hand base.
+        retreat: (3,) way of the base to the stand-off; zero if the fingers move [m].
         standoff, overshoot: (k,) the distances found [m].
         violation: Largest violated row, slack included; lengths in units of 50 mm.
         solver: Its name.
@@ -102,6 +109,7 @@ class Solution:
     q_standoff: Array
     q_overshoot: Array
     X_WB: pin.SE3
+    retreat: Array
     standoff: Array
     overshoot: Array
     violation: float
@@ -130,7 +138,7 @@ def solve_task(model: ReachModel, task: ReachTask, start: Start, *, solver: str)
     )
     w, g = np.array(result["x"]).ravel(), np.array(result["g"]).ravel()
     violation = float(w[0] + max(0.0, -g.min()))
-    return _unpacked(model, start, slots, np.clip(w, *x_bounds)[1:], violation, solver)
+    return _unpacked(model, task, start, slots, np.clip(w, *x_bounds)[1:], violation, solver)
 
 
 def _within_workspace(start: Start, workspace: Workspace) -> Start:
@@ -155,6 +163,7 @@ def _parameters(
         nominal=start.X_WB if free else workspace.X_WB,
         cosines=(least_cosine, np.cos(options.cone), np.cos(options.off_contact_cone)),
         clearance=options.clearance + _HULL_MARGIN,
+        retreat=task.retreat,
         table=np.array(_NO_TABLE if options.table is None else options.table),
         solid=task.solid,
     )
@@ -164,7 +173,7 @@ def _guess(model: ReachModel, task: ReachTask, start: Start) -> Array:
     shape, options = model.shape, task.options
     moving = start.q[list(shape.moving)]
     parts = [np.zeros(7), start.q]  # no slack, the base where it starts
-    if shape.motion:
+    if shape.by_fingers:
         half = [options.least_standoff, options.least_overshoot]
         parts += [moving, moving, np.repeat(half, shape.contacts) / LENGTH]
     return np.concatenate(parts)
@@ -185,7 +194,7 @@ def _unknown_bounds(model: ReachModel, task: ReachTask, start: Start) -> tuple[A
         [np.zeros(1), x_low / LENGTH, -s, lower],
         [np.full(1, np.inf), x_high / LENGTH, s, upper],
     )
-    if shape.motion:
+    if shape.by_fingers:
         moving, k = list(shape.moving), shape.contacts
         low += [lower[moving], lower[moving]]
         high += [upper[moving], upper[moving]]
@@ -200,6 +209,7 @@ def _unknown_bounds(model: ReachModel, task: ReachTask, start: Start) -> tuple[A
 
 def _unpacked(
     model: ReachModel,
+    task: ReachTask,
     start: Start,
     slots: NDArray[np.int64],
     w: Array,
@@ -208,10 +218,11 @@ def _unpacked(
 ) -> Solution:
     shape = model.shape
     n, m, k = shape.nq, len(shape.moving), shape.contacts
-    x, s, q, *motion = np.split(w, np.cumsum([3, 3, n, m, m, k, k])[: 7 if shape.motion else 2])
+    x, s, q, *motion = np.split(w, np.cumsum([3, 3, n, m, m, k, k])[: 7 if shape.by_fingers else 2])
     q_standoff, q_overshoot = q.copy(), q.copy()
-    standoff, overshoot = np.zeros(k), np.zeros(k)
-    if shape.motion:
+    retreat = task.retreat if shape.motion == "arm" else np.zeros(3)
+    standoff, overshoot = task.normals @ retreat, np.zeros(k)
+    if shape.by_fingers:
         moving = list(shape.moving)
         q_standoff[moving], q_overshoot[moving] = motion[0], motion[1]
         standoff, overshoot = LENGTH * motion[2][slots], LENGTH * motion[3][slots]
@@ -222,6 +233,7 @@ def _unpacked(
         q_standoff=q_standoff,
         q_overshoot=q_overshoot,
         X_WB=pin.SE3(R, start.X_WB.translation + LENGTH * x),
+        retreat=retreat,
         standoff=standoff,
         overshoot=overshoot,
         violation=violation,
