@@ -189,5 +189,3 @@ def _require_frame(frame: Array) -> None:
             "contact normal and directions: expected orthogonal vectors, largest cosine "
             f"{error.max():.2g} (rounded data: use measured_contact)"
         )
-
-
