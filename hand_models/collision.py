@@ -91,7 +91,7 @@ class HandCollision:
         self,
         q: ArrayLike,
         X_WB: pin.SE3,
-        slices: Sequence[coal.ConvexBase],
+        slices: Sequence[coal.CollisionGeometry],
         X_WO: pin.SE3,
     ) -> ObjectClearance:
         """Distances from every link to an object.
@@ -111,7 +111,7 @@ class HandCollision:
         names = tuple(self._link(i) for i in links)
         return ObjectClearance(names, distances[links], distances[list(self._pad_ids)])
 
-    def _to_object(self, shape: int, slices: Sequence[coal.ConvexBase], X_BO: pin.SE3) -> float:
+    def _to_object(self, shape: int, slices: Sequence[coal.CollisionGeometry], X_BO: pin.SE3) -> float:
         geometry = self._shapes.geometryObjects[shape].geometry
         X_BS = self._shape_data.oMg[shape]
         at = coal.Transform3s(X_BS.rotation, X_BS.translation)

@@ -5,13 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+import coal
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
-from hand_models.collision import HandCollision
+from hand_models.collision import HandCollision, LinkPair
 from hand_models.hand import Hand
 from planner.certificate import Certificate, Tolerances, certify, faults, gap_in_words
 from planner.reach_task import ReachOptions, ReachTask, Solution
+
+Array = NDArray[np.float64]
 
 _RETREATED = (0.33, 0.67, 1.0)  # shares of an arm's retreat that are checked
 _PRESSED = (0.0, 0.25, 0.5, 0.75, 1.0)  # shares of a finger's overshoot that are checked
@@ -45,6 +49,8 @@ def inspect(hand: Hand, collision: HandCollision, task: ReachTask, found: Soluti
         before = _certificate(hand, collision, task, found, share)
         wrong = faults(hand, before, found.q_standoff, fingers, wide)
         said.extend(f"at stand-off: {fault}" for fault in wrong)
+    for share in (0.0, *shares):
+        said.extend(_table_faults(hand, collision, options, found, share))
     if not by_arm and np.any(found.overshoot):
         said.extend(_pressing_faults(hand, collision, options, found))
     return Inspection(at, before, tuple(said))
@@ -64,19 +70,39 @@ def _certificate(
     hand: Hand, collision: HandCollision, task: ReachTask, found: Solution, share: float
 ) -> Certificate:
     """Of the contact (share 0), or of a share of the way to the stand-off."""
-    X_WB = pin.SE3(found.X_WB.rotation, found.X_WB.translation + share * found.retreat)
     by_arm = np.any(found.retreat)
     away = found.retreat if by_arm else found.standoff[:, None] * task.normals
     return certify(
         hand,
         collision,
-        found.q if share == 0.0 else found.q_standoff,
-        X_WB,
+        *_posture(found, share),
         task.solid,
         fingers=found.fingers,
         points=task.points + share * away,
         normals=task.normals,
     )
+
+
+def _posture(found: Solution, share: float) -> tuple[Array, pin.SE3]:
+    """Joints and base at the contact (share 0), or at a share of the way to the stand-off."""
+    X_WB = pin.SE3(found.X_WB.rotation, found.X_WB.translation + share * found.retreat)
+    return (found.q if share == 0.0 else found.q_standoff), X_WB
+
+
+def _table_faults(
+    hand: Hand, collision: HandCollision, options: ReachOptions, found: Solution, share: float
+) -> Iterator[str]:
+    if options.table is None:
+        return
+    *normal, height = options.table
+    below = coal.Halfspace(np.array(normal), height)
+    near = collision.object_clearance(*_posture(found, share), [below], pin.SE3.Identity())
+    link, distance = near.nearest()
+    if distance < options.clearance:
+        yield gap_in_words(LinkPair(link, "the table", distance))
+    for finger, pad in zip(hand.fingers, near.pads, strict=True):
+        if pad < 0.0:
+            yield gap_in_words(LinkPair(f"the pad of {finger.name}", "the table", float(pad)))
 
 
 def _pressing_faults(

@@ -109,6 +109,7 @@ class ReachSolver:
             task.solid,
             fingers=names,
             workspace=self.options.workspace,
+            table=self.options.table,
             count=self.options.starts,
         )
 

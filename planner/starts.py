@@ -82,6 +82,7 @@ class StartSearch:
         *,
         fingers: tuple[int, ...] | None,
         workspace: Workspace,
+        table: tuple[float, float, float, float] | None,
         count: int,
     ) -> list[Start]:
         """The best starts, best first.
@@ -92,6 +93,7 @@ class StartSearch:
             solid: What the links should stay out of.
             fingers: Finger index of each contact; None tries all assignments.
             workspace: Range of the hand base.
+            table: Half-space a x + b y + c z >= h that the links should stay in.
             count: At most so many.
         """
         assignments = self._assignments(len(centres), fingers)
@@ -103,7 +105,7 @@ class StartSearch:
         score = pool.misfit + workspace.violation(pool.R, pool.p)
         first = np.argsort(score, kind="stable")[:_RANKED]
         pool, score = pool.take(first), score[first]
-        score = score + self._penetration(pool, solid)
+        score = score + self._penetration(pool, solid, table)
         best = pool.take(np.argsort(score, kind="stable")[:count])
         return [
             Start(tuple(self._hand.fingers[i].name for i in f), q, pin.SE3(R, p))
@@ -170,11 +172,19 @@ class StartSearch:
             np.sqrt(square),
         )
 
-    def _penetration(self, pool: _Pool, solid: RevolvedSolid) -> Array:
-        """(N,) depth of the deepest link sphere in the object, touching pads left out [m]."""
+    def _penetration(
+        self,
+        pool: _Pool,
+        solid: RevolvedSolid,
+        table: tuple[float, float, float, float] | None,
+    ) -> Array:
+        """(N,) depth of the deepest link sphere in object or table, touching pads left out [m]."""
         local = self._spheres.positions(batch_placements(self._hand, pool.q))
         world = np.einsum("nij,nmj->nmi", pool.R, local, optimize=True) + pool.p[:, None]
         clearance = solid.distance(world) - self._spheres.radii
+        if table is not None:
+            above = world @ np.array(table[:3]) - table[3] - self._spheres.radii
+            clearance = np.minimum(clearance, above)
         touching = (self._spheres.finger_indices[None, :, None] == pool.fingers[:, None]).any(2)
         clearance[touching & self._spheres.is_pad] = 0.0
         return np.asarray(np.maximum(-clearance.min(axis=1), 0.0))
