@@ -98,7 +98,7 @@ def rank(
     order = kept[np.argsort(cost[kept], kind="stable")].astype(np.intp)
     short = order[:SHORT_LIST]
     probability = np.full(len(cost), np.nan)
-    if candidates.theta.shape[1] > 1 and not belief.contacts:
+    if len(short) and candidates.theta.shape[1] > 1 and not belief.contacts:
         probability[short] = _label_probability(belief, landed, short, noise)
         cost[short] += MISLABEL_COST * (1.0 - probability[short])
     order = np.concatenate([short[np.argsort(cost[short], kind="stable")], order[SHORT_LIST:]])

@@ -7,7 +7,7 @@ estimates the axis with its uncertainty, and touches again until the goal is met
 Writes plan.json (every placement with joint angles and approaches), result.json (estimate, truth,
 one entry per round) and probes.html (the animated hand, no server needed) into --out.
 
-Exit status: 0 goal met, 1 not met (and why), 2 bad input.
+Exit status: 0 goal met, 1 not met (and why), 2 bad input or an object out of the hand's reach.
 
 Examples:
     python scripts/plan_grasp.py
@@ -23,7 +23,7 @@ import os
 import sys
 import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -44,7 +44,8 @@ from hand_models.hand import Hand
 from planner.explore import Step, explore
 from planner.goal import Goal
 from planner.messages import plan_document, step_record
-from planner.plan import NoPlan, Probe
+from planner.plan import NoPlan, PlannerOptions, Probe
+from planner.workspace import Workspace
 from sim_sensor.camera import coarse_view
 from sim_sensor.episode import Act, BelievedAxis, Episode
 from sim_sensor.noise import simulated_sensor
@@ -72,6 +73,11 @@ class Options:
     """Stop when the direction is known within this with 95 % probability ..."""
     goal_offset_mm: float = 2.0
     """... and the position within this."""
+    wrist_mm: tuple[float, float, float] | None = None
+    """Where the arm holds the hand base, in the world; the object stands near (500, 0, 200).
+    Not given, the arm reaches everywhere."""
+    wrist_range_mm: float = 150.0
+    """How far from there, along each axis, the arm can go; it turns the hand any way."""
     budget: int = 15
     """Largest number of touches."""
     seed: int = 0
@@ -90,6 +96,7 @@ class Scenario:
     world: World
     hand: Hand
     goal: Goal
+    planner: PlannerOptions
 
 
 def main() -> int:
@@ -108,7 +115,10 @@ def main() -> int:
             steps.append(step)
             _print_round(console, step, len(steps))
     except NoPlan as error:
-        reason = str(error)
+        if not steps:
+            print(f"plan_grasp: --object {options.object}: {error}", file=sys.stderr)
+            return 2
+        reason = f"{scenario.goal.missing(steps[-1].after)}; {error}"
     return _conclude(console, scenario, options, steps, reason)
 
 
@@ -136,14 +146,27 @@ def _scenario(options: Options) -> Scenario:
         world=World(surface, simulated_sensor(options.sensor).session(rng=rng), rng=rng),
         hand=load_hand(options.hand),
         goal=Goal(np.deg2rad(options.goal_angle_deg), 1e-3 * options.goal_offset_mm),
+        planner=_planner_options(options),
     )
 
 
+def _planner_options(options: Options) -> PlannerOptions:
+    """The planner's defaults, within the arm's workspace."""
+    if options.wrist_mm is None:
+        return PlannerOptions()
+    if not np.all(np.isfinite(options.wrist_mm)):
+        raise ValueError(f"--wrist-mm: expected three finite numbers, got {options.wrist_mm}")
+    X_WB = pin.SE3(np.eye(3), 1e-3 * np.array(options.wrist_mm))
+    workspace = Workspace(X_WB, 1e-3 * options.wrist_range_mm, np.pi)
+    reach = replace(PlannerOptions().reach, workspace=workspace)
+    return PlannerOptions(reach=reach)
+
+
 def _require_writable(folder: Path) -> None:
-    """Before the work, not after it."""
+    """Before the work, not after it; nothing is created yet."""
+    existing = next(p for p in (folder, *folder.absolute().parents) if p.exists())
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
+        with tempfile.TemporaryFile(dir=existing):
             pass
     except OSError as error:
         raise ValueError(f"--out {folder}: cannot be written ({error.strerror})") from None
@@ -160,6 +183,7 @@ def _rounds(scenario: Scenario, options: Options, console: Console) -> Iterator[
         scenario.told,
         goal=scenario.goal,
         budget=options.budget,
+        options=scenario.planner,
         rng=np.random.default_rng([options.seed, 1]),
     )
     while True:
@@ -242,6 +266,7 @@ def _conclude(
     plans = json.dumps(plan_document(scenario.hand, [step.plan for step in steps]), indent=1)
     told = json.dumps(result, indent=1, allow_nan=False)
     try:
+        options.out.mkdir(parents=True, exist_ok=True)
         _write(options.out / "plan.json", plans)
         _write(options.out / "result.json", told)
         if steps:

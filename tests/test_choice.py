@@ -132,3 +132,8 @@ def test_a_common_offset_makes_the_third_contact_matter():
     candidates = placements([(0, 60, 120), (0, 120, 240)], (-20, 0, 20))
     result = ranked(candidates, belief(angle=20.0, offset=5e-3), margin=0.0, noise=noise)
     assert result.order[0] == 1
+
+
+def test_nothing_is_ranked_where_everything_is_refused():
+    result = ranked(placements([(0, 3, 120)], (-20, 0, 20)))
+    assert len(result.order) == 0

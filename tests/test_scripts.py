@@ -95,6 +95,8 @@ def test_a_sphere_is_never_claimed_to_be_known(tmp_path):
         (("--prior-offset-mm", "nan"), "--prior-offset-mm: expected > 0"),
         (("--budget", "0"), "--budget: expected at least one touch"),
         (("--seed", "-1"), "--seed: expected a number >= 0"),
+        (("--wrist-mm", "nan", "0", "0"), "--wrist-mm: expected three finite numbers"),
+        (("--wrist-mm", "0", "0", "0", "--wrist-range-mm", "-5"), "position_range"),
     ],
 )
 def test_bad_options_are_refused_and_nothing_is_written(arguments, message, tmp_path):
@@ -113,6 +115,25 @@ def test_a_profile_that_folds_back_is_refused(tmp_path):
     csv = tmp_path / "fold.csv"
     csv.write_text("r_mm,z_mm\n30,0\n31,10\n32,5\n33,20\n34,30\n")
     refused(script("plan_grasp", "--object", csv, "--out", tmp_path / "out"), "fold")
+
+
+def test_an_object_out_of_reach_is_refused_and_nothing_is_written(tmp_path):
+    out = tmp_path / "out"
+    done = script("plan_grasp", "--wrist-mm", 1500, 0, 200, "--wrist-range-mm", 50, "--out", out)
+    refused(done, "no placement of the hand makes good contacts")
+    assert "base outside its workspace" in done.stderr
+    assert not out.exists()
+
+
+def test_an_arm_with_a_small_workspace_still_finds_the_axis(tmp_path):
+    done = script(
+        "plan_grasp", "--wrist-mm", 500, 100, 300, "--wrist-range-mm", 120, "--out", tmp_path
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    plan = json.loads((tmp_path / "plan.json").read_text())
+    for placement in plan["rounds"]:
+        x, y, z = placement["base_pose"]["position"]
+        assert max(abs(x - 0.5), abs(y - 0.1), abs(z - 0.3)) <= 0.12 + 1e-4
 
 
 def test_estimate_axis_reads_the_papers_table():
