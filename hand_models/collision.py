@@ -111,7 +111,9 @@ class HandCollision:
         names = tuple(self._link(i) for i in links)
         return ObjectClearance(names, distances[links], distances[list(self._pad_ids)])
 
-    def _to_object(self, shape: int, slices: Sequence[coal.CollisionGeometry], X_BO: pin.SE3) -> float:
+    def _to_object(
+        self, shape: int, slices: Sequence[coal.CollisionGeometry], X_BO: pin.SE3
+    ) -> float:
         geometry = self._shapes.geometryObjects[shape].geometry
         X_BS = self._shape_data.oMg[shape]
         at = coal.Transform3s(X_BS.rotation, X_BS.translation)
