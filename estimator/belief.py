@@ -16,6 +16,7 @@ from estimator.prior import AxisPrior
 from estimator.surface import SurfaceOfRevolution
 from estimator.vectors import Array, frozen, unit
 
+SURE_HEIGHT = 0.7  # of the believed half height: beyond it a miss may have passed an end
 WALL = 0.3  # n . rad from which a contact tells radius and slope: r' up to about 3
 
 
@@ -25,6 +26,7 @@ class Belief:
 
     Args:
         prior: What was believed before any touch, e.g. by a camera.
+        prior_band: The profile believed then; every update conditions it anew.
         hypotheses: Axes with covariance and probability, likeliest first.
         band: The profile about the likeliest axis, z = 0 at that axis' point.
         contacts, misses: Every touch so far; the estimate always rests on all of them.
@@ -88,7 +90,8 @@ def update(belief: Belief, touches: Iterable[Contact | Miss]) -> Belief:
     touches = tuple(touches)
     contacts = belief.contacts + tuple(t for t in touches if isinstance(t, Contact))
     misses = belief.misses + tuple(t for t in touches if isinstance(t, Miss))
-    estimate = estimate_axis(contacts, prior=belief.prior, misses=misses)
+    beside = tuple(miss for miss in misses if _beside_wall(miss, belief))
+    estimate = estimate_axis(contacts, prior=belief.prior, misses=beside)
     hypotheses = tuple(_with_sense(h, belief.prior.axis) for h in estimate.hypotheses)
     band = _touched_band(belief.prior_band, hypotheses[0], contacts)
     return replace(
@@ -153,6 +156,14 @@ def _touched_band(
     r_sd = np.hypot([s.position for s in noise], np.hypot(sd[0], sd[1]))
     dr_sd = (1.0 + dr**2) * np.hypot([s.normal for s in noise], np.hypot(sd[2], sd[3]))
     return band.conditioned(z, r, dr, r_sd=r_sd, dr_sd=dr_sd)
+
+
+def _beside_wall(miss: Miss, belief: Belief) -> bool:
+    """Whether a finger that met nothing was at a height where the believed object surely is."""
+    low, high = belief.prior_band.z[0], belief.prior_band.z[-1]
+    axis = belief.prior.axis
+    height = (miss.tip - axis.point) @ axis.direction
+    return bool(abs(height - 0.5 * (low + high)) < SURE_HEIGHT * 0.5 * (high - low))
 
 
 def _on_wall(contact: Contact, axis: Axis) -> bool:

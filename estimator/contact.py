@@ -33,7 +33,8 @@ class SensorNoise:
         deviator: Of K_xy, which equals that of (K_xx - K_yy)/2 [1/m].
         mean_curvature: Of (K_xx + K_yy)/2 [1/m].
         curvature_scale: Relative, common to both curvatures of a contact [-].
-        flat: Below this a curvature is reported as saturated (NaN) [1/m].
+        flat: Below this a curvature is reported as saturated (NaN) [1/m]; infinite where
+            curvatures were not measured at all, then `direction` is all the directions' noise.
         direction_offset: Rotation common to all readings of a session, about the normal [rad].
     """
 
@@ -48,10 +49,11 @@ class SensorNoise:
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            if not (np.isfinite(value) and value >= 0.0):
+            if not value >= 0.0 or (np.isinf(value) and name != "flat"):
                 raise ValueError(f"sensor noise {name}: expected a number >= 0, got {value}")
-        if min(self.position, self.normal) <= 0.0:
-            raise ValueError("sensor noise: position and normal must be greater than zero")
+        for name in ("position", "normal", "mean_curvature", "flat"):
+            if getattr(self, name) <= 0.0:
+                raise ValueError(f"sensor noise {name}: must be greater than zero")
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +91,11 @@ class Contact:
     @property
     def umbilicity(self) -> float:
         """Half difference of the curvatures over its own noise: below 3 there is no direction."""
+        if np.isinf(self.noise.flat):
+            return float(np.inf)
         half = 0.5 * abs(np.subtract(*np.nan_to_num(self.curvatures)))
+        if half == 0.0:
+            return 0.0
         return float(np.inf if self.noise.deviator == 0.0 else half / self.noise.deviator)
 
 

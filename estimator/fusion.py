@@ -11,10 +11,10 @@ from scipy.stats import chi2
 from estimator.axis import Axis, chart_coordinates
 from estimator.contact import Contact, Miss, require_distinct
 from estimator.estimate import AxisEstimate, Hypothesis
-from estimator.likelihood import VOID_DIRECTION, Readings, readings_of
 from estimator.modes import Peak, find_peaks, labelling_probabilities, peak_probabilities
 from estimator.posterior import Posterior
 from estimator.prior import AxisPrior
+from estimator.readings import VOID_DIRECTION, Readings, readings_of
 from estimator.vectors import Array, frozen
 from estimator.verdict import judge
 
@@ -54,13 +54,8 @@ def estimate_axis(
     hypotheses = _hypotheses(peaks, probabilities)
     size = prior.radius if prior is not None else posterior.spread
     weighed = list(zip(peaks, probabilities.tolist(), strict=True))
-    verdict, reasons = judge(list(contacts), posterior.readings, weighed, hypotheses, size)
     p_value = _p_value(posterior.readings, peaks[0])
-    if p_value < 1e-3:
-        reasons += (
-            f"the contacts fit no surface of revolution well (p = {p_value:.1g}): the object "
-            "moved, is not round, or the sensor is worse than stated",
-        )
+    verdict, reasons = judge(list(contacts), posterior.readings, weighed, hypotheses, size, p_value)
     return AxisEstimate(
         hypotheses=hypotheses,
         labellings=labelling_probabilities(peaks, probabilities),

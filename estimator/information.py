@@ -8,9 +8,10 @@ from itertools import combinations, product
 import numpy as np
 
 from estimator.contact import SensorNoise
-from estimator.likelihood import Lines, Readings, evaluate, exact_readings
+from estimator.likelihood import Lines, evaluate
 from estimator.posterior import Posterior, climb
 from estimator.prior import AxisPrior
+from estimator.readings import Readings, exact_readings
 from estimator.surface import Geometry
 from estimator.vectors import Array, Index, cross, unit
 

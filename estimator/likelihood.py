@@ -22,45 +22,15 @@ Arrays: S lines, n contacts, 2 labels (which row of `directions` is the parallel
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.contact import Contact, SensorNoise
-from estimator.surface import Geometry
+from estimator.readings import Readings
 from estimator.vectors import Array, Index, basis_across, cross, unit
 
-UMBILIC = 3.0  # half difference of curvatures in its own sd, below which directions are void
-VOID_DIRECTION = 1e3  # sd [rad] that says nothing
 INSIDE = 0.05  # softness of "the axis lies behind the surface", on n . rad
-
-
-@dataclass(frozen=True, eq=False)
-class Readings:
-    """Contacts as arrays with variances; a leading axis of length 1 or S."""
-
-    p: Array  # (., n, 3)
-    n: Array  # (., n, 3)
-    k: Array  # (., n, 2, 3)
-    kappa: Array  # (., n, 2)
-    var_p: Array  # (., n)
-    var_n: Array  # (., n)
-    var_psi: Array  # (., n)
-    var_kappa: Array  # (., n, 2)
-    var_offset: float
-    size: tuple[float, float] = (0.0, np.inf)  # mean and sd of the contacts' radius [m]
-
-    def take(self, index: Index) -> Readings:
-        """Rows of the leading axis, one for each line; nothing to do where all lines share."""
-        if len(self.p) == 1:
-            return self
-        p, n, k, kappa = (x[index] for x in (self.p, self.n, self.k, self.kappa))
-        noise = (self.var_p, self.var_n, self.var_psi, self.var_kappa)
-        var_p, var_n, var_psi, var_kappa = (x[index] for x in noise)
-        return Readings(
-            p, n, k, kappa, var_p, var_n, var_psi, var_kappa, self.var_offset, self.size
-        )
+ON_AXIS = 1e-5  # a contact nearer to a line than this counts as this far away [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,62 +69,6 @@ class Terms:
 def foot(a: Array, u: Array, origin: Array) -> Array:
     """Point of each line nearest to the origin, (S, 3)."""
     return np.asarray(a + np.sum((origin - a) * u, axis=-1, keepdims=True) * u)
-
-
-def readings_of(contacts: Sequence[Contact]) -> Readings:
-    """Stack contacts, turning the noise of the curvature tensor into that of what is read."""
-    kappa = np.array([c.curvatures for c in contacts]).reshape(1, -1, 2)
-    return stacked_readings(
-        np.array([c.position for c in contacts]).reshape(1, -1, 3),
-        np.array([c.normal for c in contacts]).reshape(1, -1, 3),
-        np.array([c.directions for c in contacts]).reshape(1, -1, 2, 3),
-        kappa,
-        [c.noise for c in contacts],
-    )
-
-
-def exact_readings(geometry: Geometry, noise: SensorNoise) -> Readings:
-    """Noise-free readings of places (B, n), row 0 the parallel's: what a planner expects."""
-    n = geometry.p.shape[1]
-    return stacked_readings(
-        geometry.p,
-        geometry.n,
-        np.stack([geometry.k_theta, geometry.k_z], axis=-2),
-        np.stack([geometry.kappa_theta, geometry.kappa_z], axis=-1),
-        [noise] * n,
-    )
-
-
-def stacked_readings(
-    p: Array, n: Array, k: Array, kappa_read: Array, noise: Sequence[SensorNoise]
-) -> Readings:
-    """Readings from arrays (., n, ...) with NaN where a curvature saturated."""
-
-    def column(name: str) -> Array:
-        return np.array([getattr(s, name) for s in noise], dtype=np.float64)
-
-    saturated = np.isnan(kappa_read)
-    kappa = np.where(saturated, 0.0, kappa_read)
-    deviator = column("deviator")
-    half = 0.5 * np.abs(kappa[..., 0] - kappa[..., 1])
-    void = half < UMBILIC * deviator
-    excess = np.sqrt(np.maximum(half**2 - 2.0 * deviator**2, 0.0))  # noise alone widens half
-    psi = np.hypot(deviator / np.maximum(2.0 * excess, 1e-12), column("direction"))
-    psi = np.where(void, VOID_DIRECTION, np.maximum(psi, 1e-9))
-    even = (column("mean_curvature") ** 2 + deviator**2)[:, None]
-    var_kappa = even + (column("curvature_scale")[:, None] * kappa) ** 2
-    whole = np.ones_like(half)
-    return Readings(
-        p=p,
-        n=n,
-        k=k,
-        kappa=kappa,
-        var_p=whole * column("position") ** 2,
-        var_n=whole * column("normal") ** 2,
-        var_psi=psi**2,
-        var_kappa=np.where(saturated, column("flat")[:, None] ** 2, var_kappa),
-        var_offset=max((s.direction_offset for s in noise), default=0.0) ** 2,
-    )
 
 
 def evaluate(readings: Readings, lines: Lines) -> Terms:
@@ -208,7 +122,7 @@ def _geometry(readings: Readings, lines: Lines) -> _Geometry:
     q = readings.p - lines.a[:, None]
     u = np.broadcast_to(lines.u[:, None], q.shape)
     v = cross(u, q)
-    r = np.maximum(np.linalg.norm(v, axis=-1), 1e-12)
+    r = np.maximum(np.linalg.norm(v, axis=-1), ON_AXIS)
     e = v / r[..., None]
     rad = cross(e, u)
     E = basis_across(lines.u)  # (S, 2, 3)
@@ -283,17 +197,26 @@ def _plane_terms(
 
 
 def _curvature_terms(readings: Readings, g: _Geometry, m_n: Array, dm_n: Array) -> Terms:
-    """gamma under each label: the row taken as the parallel must fit (n . rad) / r."""
-    r = g.r[:, :, None]
+    """gamma under each label: the row taken as the parallel must fit (n . rad) / r.
+
+    An error of the position along the normal moves the prediction by sp (n . rad) / r^2.
+    """
+    r, dr = g.r[:, :, None], g.dr[:, :, None]
     predicted = m_n / r
-    d_predicted = (dm_n - predicted[..., None] * g.dr[:, :, None]) / r[..., None]
-    gamma = (readings.kappa - predicted) / readings.var_kappa
+    d_predicted = (dm_n - predicted[..., None] * dr) / r[..., None]
+    shift = predicted / r
+    d_shift = (d_predicted - shift[..., None] * dr) / r[..., None]
+    var_p = readings.var_p[:, :, None]
+    variance = readings.var_kappa + var_p * shift**2
+    d_variance = 2.0 * (var_p * shift)[..., None] * d_shift
+    gamma = (readings.kappa - predicted) / variance
     chi_square = (readings.kappa - predicted) * gamma
-    weighted = d_predicted / readings.var_kappa[..., None]
+    slope = d_predicted / np.sqrt(variance)[..., None]
+    widening = d_variance / (np.sqrt(2.0) * variance[..., None])
     return Terms(
-        0.5 * (chi_square + np.log(readings.var_kappa)),
-        -gamma[..., None] * d_predicted,
-        weighted[..., :, None] * d_predicted[..., None, :],
+        0.5 * (chi_square + np.log(variance)),
+        -gamma[..., None] * d_predicted + 0.5 * (1.0 / variance - gamma**2)[..., None] * d_variance,
+        slope[..., :, None] * slope[..., None, :] + widening[..., :, None] * widening[..., None, :],
         chi_square,
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -66,6 +66,8 @@ def find_peaks(posterior: Posterior) -> list[Peak]:
 
 def _worth_keeping(cost: Array, worse: float) -> Index:
     order = np.argsort(cost, kind="stable")
+    if not np.isfinite(cost[order[0]]):
+        raise ValueError("contacts: no line has a finite likelihood, the numbers are absurd")
     return np.asarray(order[cost[order] < cost[order[0]] + worse], dtype=np.intp)
 
 
@@ -85,9 +87,10 @@ def _distinct(lines: Lines, fisher: Array, order: Index) -> Index:
 
 def _described(posterior: Posterior, lines: Lines) -> list[Peak]:
     whole = posterior.at(lines)
-    rest = posterior.background(lines)
     terms = evaluate(posterior.readings, lines)
     weights = label_weights(terms)
+    unsized = evaluate(replace(posterior.readings, size=(0.0, np.inf)), lines)
+    from_contacts = np.einsum("snl,snlpq->spq", weights, unsized.fisher)
     chi_square = np.sum(weights * terms.chi_square, axis=(1, 2))
     sensor = np.zeros((5, 5))
     sensor[4, 4] = 1.0 / max(posterior.readings.var_offset, 1e-12)
@@ -99,7 +102,7 @@ def _described(posterior: Posterior, lines: Lines) -> list[Peak]:
             direction=lines.u[s],
             delta=float(lines.delta[s]),
             information=whole.fisher[s],
-            contacts_information=whole.fisher[s] - rest.fisher[s] + sensor,
+            contacts_information=from_contacts[s] + sensor,
             log_evidence=float(
                 -whole.cost[s] - 0.5 * np.linalg.slogdet(whole.fisher[s] + volume + floor)[1]
             ),

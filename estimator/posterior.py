@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimator.contact import Miss
-from estimator.likelihood import Lines, Readings, Terms, evaluate
+from estimator.likelihood import Lines, Terms, evaluate
 from estimator.prior import (
     AxisPrior,
     LineTerms,
@@ -24,6 +24,7 @@ from estimator.prior import (
     offset_terms,
     prior_terms,
 )
+from estimator.readings import Readings
 from estimator.vectors import Array, Index, Mask
 
 LARGEST_TURN = 0.3  # of one step [rad]

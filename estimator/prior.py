@@ -10,9 +10,10 @@ import numpy as np
 from estimator.axis import Axis, chart_coordinates
 from estimator.contact import Miss
 from estimator.likelihood import Lines
-from estimator.vectors import Array, finite_array
+from estimator.vectors import Array, finite_array, frozen
 
 MISS_SOFTNESS = 5e-3  # how sharply the believed radius may be taken where a finger met nothing [m]
+MISSED_ANYWAY = 0.2  # chance that a miss has another reason: an end, a dent, a slip
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +36,10 @@ class AxisPrior:
 
     def __post_init__(self) -> None:
         covariance = finite_array("prior covariance", self.covariance, (4, 4))
-        if not np.allclose(covariance, covariance.T, rtol=1e-9, atol=0.0):
+        scale = np.sqrt(np.abs(np.outer(np.diag(covariance), np.diag(covariance))))
+        if np.any(np.abs(covariance - covariance.T) > 1e-9 * scale):
             raise ValueError("prior covariance: expected a symmetric matrix")
+        covariance = frozen(0.5 * (covariance + covariance.T))
         if np.linalg.eigvalsh(covariance)[0] <= 0.0:
             raise ValueError("prior covariance: expected positive eigenvalues")
         for name in ("radius", "radius_sd"):
@@ -114,23 +117,34 @@ def offset_terms(variance: float, lines: Lines) -> LineTerms:
 
 
 def miss_terms(misses: Sequence[Miss], radius: float, radius_sd: float, lines: Lines) -> LineTerms:
-    """Where a finger met nothing the line is farther away than radius plus pad, softly."""
+    """Where a finger met nothing the line is farther away than radius plus pad, softly.
+
+    A miss may have other reasons, so it never costs more than -log MISSED_ANYWAY; several misses
+    share their reason and together weigh as one.
+    """
     sd = float(np.hypot(radius_sd, MISS_SOFTNESS))
-    total = LineTerms(
-        np.zeros(len(lines.a)), np.zeros((len(lines.a), 5)), np.zeros((len(lines.a), 5, 5))
-    )
+    S = len(lines.a)
+    total = LineTerms(np.zeros(S), np.zeros((S, 5)), np.zeros((S, 5, 5)))
     for miss in misses:
-        away = miss.tip - lines.a
-        away = away - np.sum(away * lines.u, axis=1, keepdims=True) * lines.u
-        along = np.sum((miss.tip - lines.a) * lines.u, axis=1)
-        rho = np.linalg.norm(away, axis=1)
-        short = np.maximum(radius + miss.radius - rho, 0.0) / sd
-        towards = lines.in_basis(away / np.maximum(rho, 1e-12)[:, None])
-        slope = np.zeros((len(rho), 5))
-        slope[:, :2] = towards / sd
-        slope[:, 2:4] = towards * along[:, None] / sd
-        slope *= (short > 0)[:, None]
+        short, slope = _shortfall(miss, radius, sd, lines)
+        told = (1.0 - MISSED_ANYWAY) * np.exp(-0.5 * short**2)
+        weight = told / (MISSED_ANYWAY + told) / len(misses)
         total += LineTerms(
-            0.5 * short**2, short[:, None] * slope, slope[:, :, None] * slope[:, None, :]
+            -np.log(MISSED_ANYWAY + told) / len(misses),
+            (weight * short)[:, None] * slope,
+            weight[:, None, None] * slope[:, :, None] * slope[:, None, :],
         )
     return total
+
+
+def _shortfall(miss: Miss, radius: float, sd: float, lines: Lines) -> tuple[Array, Array]:
+    """By how much the line is too near the pad, in sd, (S,), and its derivative (S, 5)."""
+    away = miss.tip - lines.a
+    along = np.sum(away * lines.u, axis=1)
+    away = away - along[:, None] * lines.u
+    rho = np.linalg.norm(away, axis=1)
+    short = np.maximum(radius + miss.radius - rho, 0.0) / sd
+    towards = lines.in_basis(away / np.maximum(rho, 1e-12)[:, None]) / sd
+    slope = np.zeros((len(rho), 5))
+    slope[:, :2], slope[:, 2:4] = towards, towards * along[:, None]
+    return short, slope * (short > 0)[:, None]

@@ -6,8 +6,9 @@ Contacts in:
      "contacts": [{"position": [3], "normal": [3], "directions": [[3], [3]], "curvatures": [2]}]}
 
 Positions in the unit, curvatures per unit; a curvature is null where it saturated, flatter than
-the sensor resolves. Both null means that curvatures were not measured, only their directions.
-Other keys are left alone.
+the sensor resolves; both are null on a flat end, whose directions then say nothing. Where
+curvatures were not measured at all, only their directions, "curvatures" itself is null. Other keys
+are left alone.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ from estimator.estimate import AxisEstimate, Hypothesis
 
 UNITS = {"m": 1.0, "mm": 1e-3, "in": 0.0254}
 FIELDS = ("position", "normal", "directions", "curvatures")
-UNMEASURED = 1e6  # sd of a curvature that nobody measured [1/m]
+TYPICAL = 33.7  # difference of curvatures at which presets quote a direction error [1/m]
+LARGEST = {"position": 1e3, "curvature": 1e5}  # [m], [1/m]; beyond it a number is a mistake
 
 
 def read_contacts(path: Path, noise: SensorNoise) -> tuple[Contact, ...]:
@@ -41,7 +43,7 @@ def read_contacts(path: Path, noise: SensorNoise) -> tuple[Contact, ...]:
         record = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise ValueError(f"{path}: cannot be read ({error.strerror})") from None
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise ValueError(f"{path}: not JSON: {error}") from None
     try:
         return contacts_from_record(record, noise)
@@ -58,7 +60,7 @@ def contacts_from_record(record: Any, noise: SensorNoise) -> tuple[Contact, ...]
     if not isinstance(record, Mapping):
         raise ValueError('expected an object {"unit": ..., "contacts": [...]}')
     unit = record.get("unit")
-    if unit not in UNITS:
+    if not isinstance(unit, str) or unit not in UNITS:
         raise ValueError(f"unit: expected one of {', '.join(UNITS)}, got {unit!r}")
     entries = record.get("contacts")
     if not isinstance(entries, list):
@@ -79,10 +81,17 @@ def _contact(entry: Any, metres: float, noise: SensorNoise) -> Contact:
     missing = [name for name in FIELDS if name not in entry]
     if missing:
         raise ValueError(f"{', '.join(missing)}: missing")
-    curvatures = _curvatures(entry["curvatures"]) / metres
-    if np.all(np.isnan(curvatures)):
-        noise = replace(noise, deviator=0.0, flat=UNMEASURED)
+    if entry["curvatures"] is None:
+        turn = float(np.hypot(noise.direction, noise.deviator / TYPICAL))
+        noise = replace(noise, direction=turn, flat=np.inf)
+        curvatures = np.full(2, np.nan)
+    else:
+        curvatures = _curvatures(entry["curvatures"]) / metres
+    if np.any(np.abs(curvatures) > LARGEST["curvature"]):
+        raise ValueError(f"curvatures: expected below {LARGEST['curvature']:g} per metre")
     position = _numbers("position", entry["position"], (3,)) * metres
+    if np.any(np.abs(position) > LARGEST["position"]):
+        raise ValueError(f"position: expected within {LARGEST['position']:g} m of the origin")
     normal = _numbers("normal", entry["normal"], (3,))
     directions = _numbers("directions", entry["directions"], (2, 3))
     return measured_contact(position, normal, directions, curvatures, noise)
@@ -91,7 +100,7 @@ def _contact(entry: Any, metres: float, noise: SensorNoise) -> Contact:
 def _numbers(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray[Any, Any]:
     try:
         array = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ValueError(f"{name}: expected numbers of shape {shape}, got {value!r}") from None
     if array.shape != shape or not np.all(np.isfinite(array)):
         raise ValueError(f"{name}: expected finite numbers of shape {shape}, got {value!r}")
@@ -99,15 +108,15 @@ def _numbers(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray[Any, A
 
 
 def _curvatures(value: Any) -> np.ndarray[Any, Any]:
-    allowed = "two numbers, null where saturated"
-    if not isinstance(value, list) or len(value) != 2:
-        raise ValueError(f"curvatures: expected {allowed}, got {value!r}")
-    for x in value:
-        if x is not None and not (
-            isinstance(x, int | float) and not isinstance(x, bool) and np.isfinite(x)
-        ):
-            raise ValueError(f"curvatures: expected {allowed}, got {value!r}")
+    if not isinstance(value, list) or len(value) != 2 or not all(map(_is_curvature, value)):
+        raise ValueError(f"curvatures: expected two numbers, null where saturated, got {value!r}")
     return np.array([np.nan if x is None else float(x) for x in value])
+
+
+def _is_curvature(x: Any) -> bool:
+    if x is None:
+        return True
+    return isinstance(x, int | float) and not isinstance(x, bool) and abs(x) < 1e30
 
 
 def estimate_record(estimate: AxisEstimate) -> dict[str, Any]:

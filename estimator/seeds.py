@@ -6,9 +6,10 @@ from itertools import combinations, product
 
 import numpy as np
 
-from estimator.likelihood import Lines, Readings, evaluate
+from estimator.likelihood import Lines, evaluate
 from estimator.posterior import label_weights
 from estimator.prior import AxisPrior
+from estimator.readings import Readings
 from estimator.vectors import Array, Index, cross, unit
 
 ENUMERATED = 4  # up to this many contacts every labelling gets starts of its own

@@ -1,8 +1,9 @@
 """From peaks to a verdict a person can act on.
 
 High label probability alone never makes `determined`: every hypothesis with more than one per
-cent must be fixed by the touches in all four degrees of freedom, and no labelling may leave all
-meridian planes coincident (the paper's third case, 3.8), whatever prior or magnitudes say.
+cent must be fixed by the touches in all four degrees of freedom, no labelling may leave all
+meridian planes coincident (the paper's third case, 3.8), whatever prior or magnitudes say, and the
+contacts must fit a surface of revolution at all.
 """
 
 from __future__ import annotations
@@ -14,13 +15,15 @@ from scipy.stats import chi2
 
 from estimator.contact import Contact
 from estimator.estimate import Hypothesis, Verdict
-from estimator.likelihood import VOID_DIRECTION, Readings
 from estimator.modes import Peak
+from estimator.readings import VOID_DIRECTION, Readings
 from estimator.vectors import Array, basis_across, unit
 
 FREE = 0.2  # sd [rad], or [-] of the object's size, above which a motion of the axis is free
+FEIGNED = 1.5  # information that the noise of one contact feigns [1/rad^2]
 SURE = 0.95  # probability one hypothesis needs
 MENTIONED = 0.01  # probability from which a hypothesis matters
+MISFIT = 1e-4  # p-value of the fit below which nothing is believed of the axis
 FITS = 0.01  # p-value from which planes count as coincident
 
 
@@ -39,11 +42,12 @@ def judge(
     peaks: list[tuple[Peak, float]],
     hypotheses: tuple[Hypothesis, ...],
     size: float,
+    p_value: float,
 ) -> tuple[Verdict, tuple[str, ...]]:
     """The verdict and its reasons."""
     if len(contacts) < 2:
         return "undetermined", (f"{len(contacts)} contacts: two at least can fix an axis",)
-    reasons = _coincidence_reasons(readings)
+    reasons = _misfit_reasons(p_value) + _coincidence_reasons(readings)
     for peak, probability in peaks:
         if probability > MENTIONED:
             reasons += _freedom_reasons(contacts, readings, peak, size)
@@ -60,13 +64,18 @@ def judge(
 
 
 def free_motions(peak: Peak, size: float) -> list[FreeMotion]:
-    """Motions of a peak's axis that the contacts alone leave open, freest first."""
+    """Motions of a peak's axis that the contacts alone leave open, freest first.
+
+    The noise of a contact turns its own derivative as well and so feigns an information of about
+    one per square radian: eight normals that should meet in a sphere's centre miss it, each by its
+    noise, and seem to know a direction. That much is taken off.
+    """
     information = peak.contacts_information
     cross = information[:4, 4]
     schur = information[:4, :4] - np.outer(cross, cross) / information[4, 4]
     units = np.array([size, size, 1.0, 1.0])
     values, vectors = np.linalg.eigh(schur * np.outer(units, units))
-    sds = 1.0 / np.sqrt(np.maximum(values, 1e-12))
+    sds = 1.0 / np.sqrt(np.maximum(values - FEIGNED * len(peak.label_weights), 1e-12))
     return [
         FreeMotion(vectors[:2, i], vectors[2:, i], float(sds[i])) for i in range(4) if sds[i] > FREE
     ]
@@ -128,6 +137,15 @@ def _umbilic_reasons(readings: Readings) -> list[str]:
     return [
         f"{plural} {names}: both curvatures are equal within noise (umbilic), the directions say "
         "nothing"
+    ]
+
+
+def _misfit_reasons(p_value: float) -> list[str]:
+    if p_value >= MISFIT:
+        return []
+    return [
+        f"the contacts fit no surface of revolution (p = {p_value:.1g}): the object moved, is not "
+        "round, or the sensor is worse than stated"
     ]
 
 

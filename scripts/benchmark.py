@@ -31,7 +31,7 @@ from rich.table import Table
 from estimator.axis import Axis, angle_between, offset_at
 from estimator.belief import Belief
 from estimator.contact import Contact, Miss
-from estimator.likelihood import UMBILIC
+from estimator.readings import UMBILIC
 from estimator.sensors import sensor_noise
 from estimator.singular import placed_triples, singularities
 from estimator.surface import SurfaceOfRevolution

@@ -133,6 +133,28 @@ def test_a_miss_moves_the_axis_away_from_where_nothing_was():
     assert gap > np.linalg.norm(before.axis.foot(toward) - toward) + 5e-4
 
 
+def test_misses_above_the_object_do_not_push_the_axis():
+    """A finger that passes over the rim says nothing of the wall."""
+    contacts = touches(barrel(0.033, 2.0, 0.1))
+    over = [Miss(AXIS.point + 0.07 * AXIS.direction + 0.01 * k, 0.012) for k in np.eye(3)] * 3
+    without, with_misses = update(coarse(), contacts), update(coarse(), [*contacts, *over])
+    np.testing.assert_allclose(with_misses.axis.direction, without.axis.direction, atol=1e-9)
+
+
+def test_many_misses_weigh_as_one():
+    spot = AXIS.point + 0.03 * np.cross(AXIS.direction, [1.0, 0, 0])
+    once, often = (update(coarse(), [Miss(spot, 0.012)] * count) for count in (1, 9))
+    np.testing.assert_allclose(once.axis.direction, often.axis.direction, atol=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_covariance_that_is_symmetric_up_to_rounding_is_taken(seed):
+    q, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(4, 4)))
+    covariance = q @ np.diag([1e-4, 1e-4, 0.03, 0.03]) @ q.T
+    prior = AxisPrior(AXIS, covariance, 0.03, 0.01)
+    np.testing.assert_array_equal(prior.covariance, prior.covariance.T)
+
+
 def test_samples_scatter_as_the_belief_says():
     after = update(coarse(), touches(barrel(0.033, 2.0, 0.1), "gel-poor"))
     after = replace(after, hypotheses=after.hypotheses[:1])

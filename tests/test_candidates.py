@@ -77,6 +77,7 @@ def test_the_workspace_of_the_arm_is_kept():
     _, free = found(cylinder(0.03, 0.1))
     workspace = Workspace(free.base(0), position_range=0.05, rotation_range=1.0)
     _, held = found(cylinder(0.03, 0.1), count=1500, workspace=workspace)
+    assert len(held) > 3
     for i in range(len(held)):
         X = held.base(i)
         assert np.all(np.abs(X.translation - workspace.X_WB.translation) <= 0.05 + 1e-6)

@@ -144,14 +144,15 @@ def test_a_miss_needs_a_point_and_a_radius(tip, radius, message):
 
 @pytest.mark.parametrize("name", [f.name for f in fields(SensorNoise)])
 def test_negative_or_infinite_noise_is_refused_by_name(name):
-    for value in (-1.0, np.inf, np.nan):
+    unmeasured = name == "flat"  # infinite: curvatures were not measured
+    for value in (-1.0, np.nan) if unmeasured else (-1.0, np.inf, np.nan):
         with pytest.raises(ValueError, match=f"sensor noise {name}: expected a number >= 0"):
             replace(NOISE, **{name: value})
 
 
-@pytest.mark.parametrize("name", ["position", "normal"])
+@pytest.mark.parametrize("name", ["position", "normal", "mean_curvature", "flat"])
 def test_a_sensor_without_position_or_normal_noise_is_refused(name):
-    with pytest.raises(ValueError, match="position and normal must be greater than zero"):
+    with pytest.raises(ValueError, match=f"{name}: must be greater than zero"):
         replace(NOISE, **{name: 0.0})
 
 

@@ -9,10 +9,11 @@ from hypothesis import strategies as st
 
 from estimator.axis import Axis
 from estimator.contact import Miss
-from estimator.likelihood import Lines, Readings, evaluate, readings_of
+from estimator.likelihood import Lines, evaluate
 from estimator.posterior import Posterior, over_contacts
 from estimator.prior import coarse_prior
 from estimator.profile import barrel
+from estimator.readings import Readings, readings_of
 from estimator.sensors import SENSORS
 from estimator.surface import Place, SurfaceOfRevolution
 from estimator.vectors import unit
@@ -100,6 +101,7 @@ def _noisy(exact, count, rng):
     p, n, k = repeat(exact.p), repeat(exact.n), repeat(exact.k)
     sd_p, sd_n = np.sqrt(exact.var_p[0, 0]), np.sqrt(exact.var_n[0, 0])
     p = p + sd_p * np.einsum("cl,clx->cx", rng.normal(size=(count, 2)), k[:, 0])[:, None]
+    p = p + sd_p * rng.normal(size=(count, 1, 1)) * n
     turn = np.sqrt(exact.var_psi[0, 0]) * rng.normal(size=(count, 1, 1, 1))
     k = np.cos(turn) * k + np.sin(turn) * np.cross(n[:, :, None], k)
     tilt = sd_n * rng.normal(size=(count, 1, 2))

@@ -2,16 +2,21 @@
 
 import copy
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from estimator.axis import Axis
 from estimator.fusion import estimate_axis
-from estimator.profile import barrel
+from estimator.profile import barrel, cylinder
+from estimator.readings import VOID_DIRECTION, readings_of
 from estimator.records import contacts_from_record, estimate_record, read_contacts
 from estimator.sensors import SENSORS
 from estimator.surface import Place, SurfaceOfRevolution
+from planner.messages import outcome_record
+from sim_sensor.noise import simulated_sensor
+from sim_sensor.world import World
 
 NOISE = SENSORS["gel"]
 
@@ -58,16 +63,54 @@ def test_null_is_a_saturated_curvature():
     assert np.isnan(contacts_from_record(data, NOISE)[0].curvatures[1])
 
 
-def test_two_nulls_are_directions_without_magnitudes():
+def test_curvatures_that_were_not_measured_leave_directions_with_their_usual_noise():
     data = record()
     for entry in data["contacts"]:
-        entry["curvatures"] = [None, None]
-    estimate = estimate_axis(contacts_from_record(data, NOISE))
-    assert not any("umbilic" in reason for reason in estimate.reasons)
+        entry["curvatures"] = None
+    contacts = contacts_from_record(data, NOISE)
+    sd = np.sqrt(readings_of(contacts).var_psi)
+    np.testing.assert_allclose(sd, NOISE.deviator / 33.7)
+    assert not any("umbilic" in reason for reason in estimate_axis(contacts).reasons)
+
+
+def test_two_nulls_are_a_flat_end_whose_directions_say_nothing():
+    data = record()
+    data["contacts"][0]["curvatures"] = [None, None]
+    contacts = contacts_from_record(data, NOISE)
+    assert contacts[0].umbilicity == 0.0
+    assert readings_of(contacts).var_psi[0, 0] == VOID_DIRECTION**2
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_what_a_plan_felt_reads_back_the_same(seed):
+    """Flat ends and noise included: messages out, records in, the same estimate."""
+    rng = np.random.default_rng(seed)
+    surface = SurfaceOfRevolution(Axis([0.1, 0.2, 0.3], [0.1, 0.2, 1.0]), cylinder(0.03, 0.1))
+    session = simulated_sensor("gel").session(rng=rng)
+    world = World(surface, session, rng=rng)
+    felt = [
+        session.read(surface.at(np.array(t), np.array(z)), rng=rng)
+        for t, z in ((0.0, -0.02), (1.2, 0.0), (2.3, 0.02))
+    ]
+    u, e = surface.axis.direction, surface.frame[0]
+    for side in (0.3, -0.4):
+        top = surface.axis.point + 0.1 * u + 0.03 * side * e
+        path = SimpleNamespace(tip_centres=np.array([top, top - 0.1 * u]), pad_radius=0.012)
+        felt.append(world.touch(path))
+    told = {"unit": "m", "contacts": [outcome_record("index", c)["contact"] for c in felt]}
+    told = json.loads(json.dumps(told, allow_nan=False))
+    direct, read = estimate_axis(felt), estimate_axis(contacts_from_record(told, NOISE))
+    assert read.verdict == direct.verdict
+    np.testing.assert_allclose(read.axis.direction, direct.axis.direction, atol=1e-6)
 
 
 BAD = [
     (("unit",), "feet", "unit: expected one of m, mm, in, got 'feet'"),
+    (("unit",), ["m"], "unit: expected one of m, mm, in"),
+    (("contacts", 0, "position"), [10**400, 0, 0], "contact 1: position: expected"),
+    (("contacts", 0, "position"), [1e300, 0, 0], "contact 1: position: expected within 1000 m"),
+    (("contacts", 0, "curvatures"), [10**400, 0], "contact 1: curvatures: expected two numbers"),
+    (("contacts", 0, "curvatures"), [1e20, 0], "contact 1: curvatures: expected below"),
     (("contacts",), {}, "contacts: expected a list"),
     (("contacts", 1), [], "contact 2: expected an object"),
     (("contacts", 1, "normal"), [0, 0, 0], "contact 2: normal: expected a unit vector"),
@@ -135,6 +178,9 @@ def test_files_that_are_none_are_named(tmp_path):
         read_contacts(tmp_path / "none.json", NOISE)
     bad = tmp_path / "bad.json"
     bad.write_text("{")
+    with pytest.raises(ValueError, match=r"bad\.json: not JSON"):
+        read_contacts(bad, NOISE)
+    bad.write_text("[" * 200_000)
     with pytest.raises(ValueError, match=r"bad\.json: not JSON"):
         read_contacts(bad, NOISE)
     bad.write_bytes(b"\xff\xfe\x00")
