@@ -47,7 +47,7 @@ def judge(
     """The verdict and its reasons."""
     if len(contacts) < 2:
         return "undetermined", (f"{len(contacts)} contacts: two at least can fix an axis",)
-    reasons = _misfit_reasons(p_value) + _coincidence_reasons(readings)
+    reasons = _misfit_reasons(p_value) + _coincidence_reasons(readings) + _sphere_reasons(readings)
     for peak, probability in peaks:
         if probability > MENTIONED:
             reasons += _freedom_reasons(contacts, readings, peak, size)
@@ -94,11 +94,7 @@ def _freedom_reasons(
             "touch the side"
         ]
     if len(motions) == 2 and all(np.linalg.norm(m.tilt) > 0.5 for m in motions):
-        point = _pivot(peak, motions[0], size)
-        return [
-            f"the normals meet at one point, as on a sphere: any line through "
-            f"{_millimetres(point)} fits; touch where the surface is not spherical"
-        ]
+        return _sphere_words(_pivot(peak, motions[0], size))
     return [_motion_in_words(contacts, peak, motion, size) for motion in motions]
 
 
@@ -161,6 +157,29 @@ def _coincidence_reasons(readings: Readings) -> list[str]:
         for first in (0, 1)
         if _planes_coincide(readings, first)
     ][:1]
+
+
+def _sphere_reasons(readings: Readings) -> list[str]:
+    """All contacts umbilic and all normals through one point, within the noise."""
+    if np.any(readings.var_psi < VOID_DIRECTION**2):
+        return []
+    p, n = readings.p[0], readings.n[0]
+    across = np.eye(3) - n[:, :, None] * n[:, None, :]
+    total = across.sum(axis=0)
+    if np.linalg.eigvalsh(total)[0] < 1e-3 * len(n):
+        return []  # parallel: a flat end, which has words of its own
+    centre = np.linalg.solve(total, np.einsum("nij,nj->i", across, p))
+    miss = np.einsum("nij,nj->ni", across, centre - p)
+    variance = readings.var_p[0] + readings.var_n[0] * np.sum((centre - p) ** 2, axis=1)
+    statistic = np.sum(np.sum(miss**2, axis=1) / variance)
+    return _sphere_words(centre) if chi2.sf(statistic, 2 * len(n) - 3) > FITS else []
+
+
+def _sphere_words(centre: Array) -> list[str]:
+    return [
+        f"the normals meet at one point, as on a sphere: any line through {_millimetres(centre)} "
+        "fits; touch where the surface is not spherical"
+    ]
 
 
 def _planes_coincide(readings: Readings, first: int) -> bool:
