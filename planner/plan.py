@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Literal, get_args
 
 import numpy as np
@@ -30,6 +30,7 @@ Funnel = tuple[tuple[str, int], ...]
 Criterion = Literal["default", "random"]
 
 SOLID_HEIGHTS = 101
+OFFSET_GUARD = float(np.deg2rad(5.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +44,8 @@ class PlannerOptions:
         placements: How many postures are laid onto the believed surface.
         objects: How many objects are drawn from the belief.
         tries: How many of the best placements are handed to the optimiser.
+        offset_guard: Common rotation of the directions that a plan is proof against, whether the
+            sensor admits one or not [rad]: contacts that wrap around cancel it.
         criterion: "default" ranks (`planner.choice`); "random" takes what the hand reaches in no
             order and refuses nothing: the peer that benchmarks compare with.
     """
@@ -53,6 +56,7 @@ class PlannerOptions:
     placements: int = 1200
     objects: int = 20
     tries: int = 24
+    offset_guard: float = OFFSET_GUARD
     criterion: Criterion = "default"
 
     def __post_init__(self) -> None:
@@ -191,7 +195,9 @@ def _best_placement(
         return funnel
     samples = sample_objects(belief, options.objects, rng=rng)
     margin = options.margin if options.criterion == "default" else 0.0
-    ranking = rank(candidates, belief, samples, sensor, goal, margin=margin)
+    offset = float(np.hypot(sensor.direction_offset, options.offset_guard))
+    guarded = replace(sensor, direction_offset=offset)
+    ranking = rank(candidates, belief, samples, guarded, goal, margin=margin)
     if options.criterion == "random":
         ranking = replace(ranking, order=rng.permutation(len(candidates)))
     funnel += tuple((f"{count} fingers: singular: {words}", n) for words, n in ranking.rejected)
@@ -213,18 +219,8 @@ def _candidates(
     count: int,
     rng: np.random.Generator,
 ) -> Candidates:
-    if count == 1:
-        return single_candidates(
-            tools.hand,
-            tools.postures,
-            tools.spheres,
-            surface,
-            cone=options.reach.cone,
-            workspace=options.reach.workspace,
-            count=options.placements,
-            rng=rng,
-        )
-    return placement_candidates(
+    make = single_candidates if count == 1 else partial(placement_candidates, fingers_at_once=count)
+    return make(
         tools.hand,
         tools.postures,
         tools.spheres,
@@ -232,7 +228,6 @@ def _candidates(
         cone=options.reach.cone,
         workspace=options.reach.workspace,
         count=options.placements,
-        fingers_at_once=count,
         rng=rng,
     )
 
@@ -292,7 +287,7 @@ def _plan(
         bound=AxisBound(
             frozen(ranking.pair_bound.position[i]), frozen(ranking.pair_bound.angle[i])
         ),
-        covariance=ranking.covariance[i],
+        covariance=frozen(ranking.covariance[i]),
         angle=float(ranking.angle[i]),
         offset=float(ranking.offset[i]),
         margin=float(ranking.margin[i]),

@@ -29,12 +29,11 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import tyro
-from rich.box import SIMPLE_HEAD
+from grasp_report import episode_of, print_round
 from rich.console import Console
-from rich.table import Table
 
 from estimator.axis import Axis, angle_between, offset_at
-from estimator.belief import Belief, update
+from estimator.belief import Belief
 from estimator.contact import Contact, Miss, SensorNoise
 from estimator.records import estimate_record
 from estimator.sensors import sensor_noise
@@ -47,7 +46,6 @@ from planner.messages import plan_document, step_record
 from planner.plan import NoPlan, PlannerOptions, Probe
 from planner.workspace import Workspace
 from sim_sensor.camera import coarse_view
-from sim_sensor.episode import Act, BelievedAxis, Episode
 from sim_sensor.noise import simulated_sensor
 from sim_sensor.objects import load_object
 from sim_sensor.view import write_page
@@ -61,8 +59,8 @@ class Options:
     hand: str = "allegro_right"
     """Hand: allegro_right, allegro_left, or the path of a description (.toml)."""
     object: str = "can"
-    """What is touched: a built-in name (can, bottle, cone, cup, barrel, jar-lid, knob, vase,
-    paper-lathe, sphere) or a CSV file with columns r_mm,z_mm."""
+    """What is touched: a built-in name (can, bottle, cone, cup, barrel, jar-lid, knob, vase, egg,
+    spindle, paper-lathe, sphere) or a CSV file with columns r_mm,z_mm."""
     sensor: str = "gel"
     """Tactile sensor: ideal, fearing1988, robotworld, taxel, gel, gel-good, gel-poor."""
     prior_angle_deg: float = 15.0
@@ -113,7 +111,7 @@ def main() -> int:
     try:
         for step in _rounds(scenario, options, console):
             steps.append(step)
-            _print_round(console, step, len(steps))
+            print_round(console, step, len(steps))
     except NoPlan as error:
         if not steps:
             print(f"plan_grasp: --object {options.object}: {error}", file=sys.stderr)
@@ -125,8 +123,8 @@ def main() -> int:
 def _scenario(options: Options) -> Scenario:
     if not (np.isfinite(options.prior_angle_deg) and 0 < options.prior_angle_deg < 90):
         raise ValueError(f"--prior-angle-deg: expected 0 to 90, got {options.prior_angle_deg}")
-    if not (np.isfinite(options.prior_offset_mm) and options.prior_offset_mm > 0):
-        raise ValueError(f"--prior-offset-mm: expected > 0, got {options.prior_offset_mm}")
+    if not 0 < options.prior_offset_mm <= 1000:
+        raise ValueError(f"--prior-offset-mm: expected 0 to 1000, got {options.prior_offset_mm}")
     if options.budget < 1:
         raise ValueError(f"--budget: expected at least one touch, got {options.budget}")
     if options.seed < 0:
@@ -194,44 +192,6 @@ def _rounds(scenario: Scenario, options: Options, console: Console) -> Iterator[
         yield step
 
 
-def _print_round(console: Console, step: Step, number: int) -> None:
-    plan = step.plan
-    console.print(f"\n[bold]Round {number}[/]: {len(plan.probes)} touches in one placement")
-    table = Table(box=SIMPLE_HEAD, pad_edge=False)
-    for heading in ("finger", "meridian", "height", "reach residual", "felt"):
-        table.add_column(heading, justify="left" if heading == "finger" else "right")
-    for j, (probe, outcome) in enumerate(zip(plan.probes, step.outcomes, strict=True)):
-        table.add_row(
-            probe.finger,
-            f"{np.rad2deg(probe.place.theta) % 360:.0f} deg",
-            f"{1e3 * probe.place.z:+.0f} mm",
-            f"{1e6 * plan.reach.certificate.position_residuals[j]:.1f} um",
-            "nothing" if isinstance(outcome, Miss) else _felt(probe, outcome),
-        )
-    console.print(table)
-    if np.isfinite(plan.margin):
-        console.print(
-            f"  worst case of the best pair {np.rad2deg(plan.bound.angle):.1f} deg, margin "
-            f"{plan.margin:.2f} from: {plan.nearest}"
-        )
-    estimate = step.after.estimate
-    if estimate is not None:
-        console.print(
-            f"  [bold]{estimate.verdict}[/]: direction within "
-            f"{np.rad2deg(estimate.angle_95):.1f} deg, position within "
-            f"{1e3 * estimate.offset_95:.1f} mm (95 %); expected before "
-            f"{np.rad2deg(plan.angle):.1f} deg, {1e3 * plan.offset:.1f} mm"
-        )
-        if estimate.verdict != "determined":
-            for reason in estimate.reasons:
-                console.print(f"    {reason}")
-
-
-def _felt(probe: Probe, contact: Contact) -> str:
-    depth = float((probe.expected.position - contact.position) @ probe.expected.normal)
-    return f"{1e3 * abs(depth):.1f} mm {'farther' if depth > 0 else 'nearer'} than believed"
-
-
 def _conclude(
     console: Console, scenario: Scenario, options: Options, steps: list[Step], reason: str
 ) -> int:
@@ -263,14 +223,17 @@ def _conclude(
         "goal": {"angle_deg": options.goal_angle_deg, "offset_mm": options.goal_offset_mm},
         "rounds": [step_record(step) for step in steps],
     }
-    plans = json.dumps(plan_document(scenario.hand, [step.plan for step in steps]), indent=1)
+    document = plan_document(scenario.hand, [step.plan for step in steps])
+    plans = json.dumps(document, indent=1, allow_nan=False)
     told = json.dumps(result, indent=1, allow_nan=False)
     try:
         options.out.mkdir(parents=True, exist_ok=True)
+        if steps:
+            words = f"{error['angle_deg']:.2f} deg and {error['offset_mm']:.2f} mm from the truth"
+            episode = episode_of(scenario.surface, scenario.world, steps, words)
+            write_page(options.out / "probes.html", scenario.hand, episode)
         _write(options.out / "plan.json", plans)
         _write(options.out / "result.json", told)
-        if steps:
-            write_page(options.out / "probes.html", scenario.hand, _episode(scenario, steps, error))
     except OSError as failure:
         print(f"plan_grasp: {options.out}: cannot be written ({failure})", file=sys.stderr)
         return 2
@@ -284,34 +247,6 @@ def _conclude(
 
 def _middle(surface: SurfaceOfRevolution) -> np.ndarray:
     return surface.axis.point + np.mean(surface.profile.z_range) * surface.axis.direction
-
-
-def _episode(scenario: Scenario, steps: list[Step], error: dict[str, float]) -> Episode:
-    """What the page plays: each touch with the belief just before and just after it."""
-    acts: list[Act] = []
-    for step in steps:
-        belief = step.before
-        for probe, outcome in zip(step.plan.probes, step.outcomes, strict=True):
-            after = update(belief, [outcome])
-            record = scenario.world.records[len(acts)]
-            acts.append(
-                Act(
-                    finger=probe.finger,
-                    path=probe.approach.path,
-                    bases=_poses(probe),
-                    stop=record.stop,
-                    outcome=outcome,
-                    before=BelievedAxis(belief.axis, belief.covariance),
-                    after=BelievedAxis(after.axis, after.covariance),
-                )
-            )
-            belief = after
-    conclusion = f"{error['angle_deg']:.2f} deg and {error['offset_mm']:.2f} mm from the truth"
-    return Episode(scenario.surface, tuple(acts), conclusion=conclusion)
-
-
-def _poses(probe: Probe) -> tuple[pin.SE3, ...]:
-    return tuple(probe.approach.bases)
 
 
 def _write(path: Path, text: str) -> None:

@@ -29,6 +29,9 @@ _UNITS = {"mm": 1e-3, "m": 1.0}
 _FEWEST_POINTS = 4
 
 
+LARGEST = 10.0  # radius or height of an object [m]
+
+
 def _lathe_of_the_paper() -> PolynomialProfile:
     """r = -0.2078 + 0.6034 z - 0.07465 z^2 inches over z = 4.4 .. 6.6.
 
@@ -83,7 +86,10 @@ def load_object(name_or_csv: str | Path) -> Profile:
         return _OBJECTS[name]()
     path = Path(name_or_csv)
     if path.is_file():
-        return _read_profile(path)
+        profile = _read_profile(path)
+        if max(profile.r.max(), np.ptp(profile.z)) > LARGEST:
+            raise ValueError(f"object {path}: larger than {LARGEST:g} m, is the unit right?")
+        return profile
     if path.suffix.lower() == ".csv":
         raise ValueError(f"object {name!r}: there is no such file")
     raise ValueError(

@@ -110,3 +110,10 @@ def test_a_file_of_bytes_is_refused(tmp_path: Path) -> None:
     path.write_bytes(b"\x80\x81\xff\xfe")
     with pytest.raises(ValueError, match="cannot be read as text"):
         load_object(path)
+
+
+def test_an_object_of_the_wrong_unit_is_refused(tmp_path):
+    path = tmp_path / "huge.csv"
+    path.write_text("r_m,z_m\n30,0\n31,10\n32,20\n33,30\n34,40\n")
+    with pytest.raises(ValueError, match="larger than 10 m, is the unit right"):
+        load_object(path)

@@ -92,8 +92,9 @@ def test_a_sphere_is_never_claimed_to_be_known(tmp_path):
         (("--goal-angle-deg", "0"), "goal angle"),
         (("--goal-offset-mm", "-1"), "goal offset"),
         (("--prior-angle-deg", "120"), "--prior-angle-deg: expected 0 to 90"),
-        (("--prior-offset-mm", "nan"), "--prior-offset-mm: expected > 0"),
+        (("--prior-offset-mm", "nan"), "--prior-offset-mm: expected 0 to 1000"),
         (("--budget", "0"), "--budget: expected at least one touch"),
+        (("--prior-offset-mm", "1e300"), "--prior-offset-mm: expected 0 to 1000"),
         (("--seed", "-1"), "--seed: expected a number >= 0"),
         (("--wrist-mm", "nan", "0", "0"), "--wrist-mm: expected three finite numbers"),
         (("--wrist-mm", "0", "0", "0", "--wrist-range-mm", "-5"), "position_range"),
@@ -164,6 +165,13 @@ def test_benchmark_runs(tmp_path):
     assert done.returncode == 0, done.stderr
     runs = [json.loads(line) for line in lines.read_text().splitlines()]
     assert [run["criterion"] for run in runs] == ["default", "random"]
+
+
+def test_benchmark_refuses_before_it_runs(tmp_path):
+    refused(script("benchmark", "--out", tmp_path), "")
+    refused(script("benchmark", "--settings", "easy"), "--settings: expected some of coarse")
+    refused(script("benchmark", "--objects", "teapot"), "teapot")
+    refused(script("benchmark", "--runs", 0), "--runs and --objects")
 
 
 @pytest.mark.parametrize("name", ["plan_grasp", "estimate_axis", "benchmark"])

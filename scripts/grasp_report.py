@@ -1,0 +1,79 @@
+"""What plan_grasp.py shows: a table for each round, and the episode that the page plays."""
+
+from __future__ import annotations
+
+import numpy as np
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+
+from estimator.belief import update
+from estimator.contact import Contact, Miss
+from estimator.surface import SurfaceOfRevolution
+from planner.explore import Step
+from planner.plan import Probe
+from sim_sensor.episode import Act, BelievedAxis, Episode
+from sim_sensor.world import World
+
+
+def print_round(console: Console, step: Step, number: int) -> None:
+    plan = step.plan
+    console.print(f"\n[bold]Round {number}[/]: {len(plan.probes)} touches in one placement")
+    table = Table(box=SIMPLE_HEAD, pad_edge=False)
+    for heading in ("finger", "meridian", "height", "reach residual", "felt"):
+        table.add_column(heading, justify="left" if heading == "finger" else "right")
+    for j, (probe, outcome) in enumerate(zip(plan.probes, step.outcomes, strict=True)):
+        table.add_row(
+            probe.finger,
+            f"{np.rad2deg(probe.place.theta) % 360:.0f} deg",
+            f"{1e3 * probe.place.z:+.0f} mm",
+            f"{1e6 * plan.reach.certificate.position_residuals[j]:.1f} um",
+            "nothing" if isinstance(outcome, Miss) else _felt(probe, outcome),
+        )
+    console.print(table)
+    if np.isfinite(plan.margin):
+        console.print(
+            f"  worst case of the best pair {np.rad2deg(plan.bound.angle):.1f} deg, margin "
+            f"{plan.margin:.2f} from: {plan.nearest}"
+        )
+    estimate = step.after.estimate
+    if estimate is not None:
+        console.print(
+            f"  [bold]{estimate.verdict}[/]: direction within "
+            f"{np.rad2deg(estimate.angle_95):.1f} deg, position within "
+            f"{1e3 * estimate.offset_95:.1f} mm (95 %); expected before "
+            f"{np.rad2deg(plan.angle):.1f} deg, {1e3 * plan.offset:.1f} mm"
+        )
+        if estimate.verdict != "determined":
+            for reason in estimate.reasons:
+                console.print(f"    {reason}")
+
+
+def _felt(probe: Probe, contact: Contact) -> str:
+    depth = float((probe.expected.position - contact.position) @ probe.expected.normal)
+    return f"{1e3 * abs(depth):.1f} mm {'farther' if depth > 0 else 'nearer'} than believed"
+
+
+def episode_of(
+    surface: SurfaceOfRevolution, world: World, steps: list[Step], conclusion: str
+) -> Episode:
+    """Each touch with the belief just before and just after it."""
+    acts: list[Act] = []
+    for step in steps:
+        belief = step.before
+        for probe, outcome in zip(step.plan.probes, step.outcomes, strict=True):
+            after = update(belief, [outcome])
+            record = world.records[len(acts)]
+            acts.append(
+                Act(
+                    finger=probe.finger,
+                    path=probe.approach.path,
+                    bases=probe.approach.bases,
+                    stop=record.stop,
+                    outcome=outcome,
+                    before=BelievedAxis(belief.axis, belief.covariance),
+                    after=BelievedAxis(after.axis, after.covariance),
+                )
+            )
+            belief = after
+    return Episode(surface, tuple(acts), conclusion=conclusion)
