@@ -2,7 +2,8 @@
 
 from planner.explore import Step, explore
 from planner.goal import Goal
-from planner.plan import NoPlan, Plan, PlannerOptions, Probe, plan_probes
+from planner.options import PlannerOptions
+from planner.plan import NoPlan, Plan, Probe, plan_probes
 from planner.reach_task import ReachOptions
 from planner.workspace import Workspace
 

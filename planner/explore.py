@@ -11,7 +11,8 @@ from estimator.belief import Belief, update
 from estimator.contact import Contact, Miss, SensorNoise
 from hand_models.hand import Hand
 from planner.goal import Goal
-from planner.plan import Plan, PlannerOptions, Probe, plan_probes
+from planner.options import PlannerOptions
+from planner.plan import Plan, Probe, plan_probes
 
 Touch = Callable[[Probe], Contact | Miss]
 

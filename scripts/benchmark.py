@@ -41,7 +41,8 @@ from hand_models import load_hand
 from hand_models.hand import Hand
 from planner.explore import explore
 from planner.goal import Goal
-from planner.plan import Criterion, NoPlan, PlannerOptions, Probe
+from planner.options import Criterion, PlannerOptions
+from planner.plan import NoPlan, Probe
 from sim_sensor.camera import coarse_view
 from sim_sensor.noise import simulated_sensor
 from sim_sensor.objects import load_object

@@ -43,7 +43,8 @@ from hand_models.hand import Hand
 from planner.explore import Step, explore
 from planner.goal import Goal
 from planner.messages import plan_document, step_record
-from planner.plan import NoPlan, PlannerOptions, Probe
+from planner.options import PlannerOptions
+from planner.plan import NoPlan, Probe
 from planner.workspace import Workspace
 from sim_sensor.camera import coarse_view
 from sim_sensor.noise import simulated_sensor

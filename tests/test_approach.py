@@ -10,7 +10,8 @@ from estimator.sensors import SENSORS
 from hand_models import load_hand
 from planner.goal import Goal
 from planner.motion import SPACING, approach_by_base
-from planner.plan import PlannerOptions, plan_probes
+from planner.options import PlannerOptions
+from planner.plan import plan_probes
 
 AXIS = Axis(np.array([0.5, 0.1, 0.2]), np.array([0.1, -0.2, 0.9]))
 HAND = load_hand("allegro_right")

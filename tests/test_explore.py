@@ -14,7 +14,8 @@ from estimator.surface import SurfaceOfRevolution
 from hand_models import load_hand
 from planner.explore import explore
 from planner.goal import Goal
-from planner.plan import NoPlan, PlannerOptions, plan_probes
+from planner.options import PlannerOptions
+from planner.plan import NoPlan, plan_probes
 from planner.reach_task import ReachOptions
 from planner.workspace import Workspace
 from sim_sensor.camera import coarse_view

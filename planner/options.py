@@ -1,0 +1,51 @@
+"""How a plan is made."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal, get_args
+
+import numpy as np
+
+from planner.choice import MARGIN
+from planner.reach_task import ReachOptions
+
+Criterion = Literal["default", "random"]
+OFFSET_GUARD = float(np.deg2rad(5.0))
+
+
+@dataclass(frozen=True, eq=False)
+class PlannerOptions:
+    """How a plan is made.
+
+    Args:
+        reach: Rules of reachability: pad cone, clearances, the arm's workspace, stroke.
+        fingers_at_once: Contacts of one placement of the hand; fewer where so many do not reach.
+        margin: Smallest margin from every singularity, kept by nine in ten sampled objects [-].
+        placements: How many postures are laid onto the believed surface.
+        objects: How many objects are drawn from the belief.
+        tries: How many of the best placements are handed to the optimiser.
+        offset_guard: Common rotation of the directions that a plan is proof against, whether the
+            sensor admits one or not [rad]: contacts that wrap around cancel it.
+        criterion: "default" ranks (`planner.choice`); "random" takes what the hand reaches in no
+            order and refuses nothing: the peer that benchmarks compare with.
+    """
+
+    reach: ReachOptions = field(default_factory=lambda: ReachOptions(starts=0, rescues=1))
+    fingers_at_once: int = 3
+    margin: float = MARGIN
+    placements: int = 1200
+    objects: int = 20
+    tries: int = 24
+    offset_guard: float = OFFSET_GUARD
+    criterion: Criterion = "default"
+
+    def __post_init__(self) -> None:
+        if self.fingers_at_once not in (1, 2, 3):
+            raise ValueError(f"fingers_at_once: expected 1, 2 or 3, got {self.fingers_at_once}")
+        if self.criterion not in get_args(Criterion):
+            known = ", ".join(get_args(Criterion))
+            raise ValueError(f"criterion {self.criterion!r} is unknown; known are {known}")
+        for name in ("placements", "objects", "tries"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name}: expected at least 1, got {getattr(self, name)}")
