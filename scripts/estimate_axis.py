@@ -23,7 +23,6 @@ from typing import Annotated
 
 import numpy as np
 import tyro
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
@@ -81,7 +80,7 @@ def _print(estimate: AxisEstimate, count: int) -> None:
 
 
 def _hypotheses(estimate: AxisEstimate) -> Table:
-    table = Table(box=SIMPLE_HEAD, pad_edge=False)
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for heading in ("P", "through, mm", "direction", "sd, deg", "sd, mm", "offset, deg"):
         table.add_column(heading, justify="right", no_wrap=True)
     for h in estimate.hypotheses[:5]:
@@ -98,7 +97,7 @@ def _hypotheses(estimate: AxisEstimate) -> Table:
 
 
 def _labellings(estimate: AxisEstimate) -> Table:
-    table = Table(box=SIMPLE_HEAD, pad_edge=False)
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     table.add_column("labelling")
     table.add_column("P", justify="right")
     for labelling, probability in estimate.labellings[:5]:
