@@ -39,3 +39,7 @@ def test_every_sensor_named_is_known():
     named = set(re.findall(r'sensor_noise\("([\w-]+)"\)', "".join(BLOCKS)))
     assert named
     assert named <= set(SENSORS)
+
+
+def test_no_placeholder_is_left():
+    assert not re.search(r"^[A-Z]{5,}$", (ROOT / "README.md").read_text(), flags=re.MULTILINE)
