@@ -291,7 +291,7 @@ def test_sensors_are_checked_by_name_and_offset() -> None:
 
 
 def test_a_sensor_of_ones_own_needs_no_preset() -> None:
-    noise = SensorNoise(1e-9, 1e-9, 0.0, 0.0, 0.0, 0.0, 0.0)
+    noise = SensorNoise(1e-9, 1e-9, 0.0, 0.0, 1e-12, 0.0, 1e-9)
     own = SimulatedSensor(noise, noise, CommonErrors(log_radius=np.log(2.0)))
     rng, truth = np.random.default_rng(0), truth_at(0.2)
     session: Session = own.session(rng=rng)
