@@ -10,7 +10,7 @@ labels come out right.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -80,16 +80,21 @@ def rank(
     goal: Goal,
     *,
     margin: float = MARGIN,
+    offset_guard: float = 0.0,
 ) -> Ranking:
     """Refuse and rank.
 
     Args:
         samples: Objects drawn from the belief.
         margin: Smallest margin from a singularity; zero ranks all.
+        offset_guard: Common rotation of the directions that the expected error reckons with beside
+            what the sensor admits [rad]; bound and predicted covariance are the sensor's own.
     """
     place = belief.surface.at(candidates.theta, candidates.z)
     landed = prospects(samples, place.p, place.n)
-    value, angle, offset = _expected_error(belief, landed, noise, goal)
+    common = float(np.hypot(noise.direction_offset, offset_guard))
+    guarded = replace(noise, direction_offset=common)
+    value, angle, offset = _expected_error(belief, landed, guarded, goal)
     covariance = _believed_covariance(belief, place, noise)
     bound, best_bound = _pair_bound(candidates.theta, place, noise)
     margins_at, nearest = _margins(belief, landed, samples)

@@ -156,9 +156,15 @@ def _best_placement(
         return funnel
     samples = sample_objects(belief, options.objects, rng=rng)
     margin = options.margin if options.criterion == "default" else 0.0
-    offset = float(np.hypot(sensor.direction_offset, options.offset_guard))
-    guarded = replace(sensor, direction_offset=offset)
-    ranking = rank(candidates, belief, samples, guarded, goal, margin=margin)
+    ranking = rank(
+        candidates,
+        belief,
+        samples,
+        sensor,
+        goal,
+        margin=margin,
+        offset_guard=options.offset_guard,
+    )
     if options.criterion == "random":
         ranking = replace(ranking, order=rng.permutation(len(candidates)))
     funnel += tuple((f"{count} fingers: singular: {words}", n) for words, n in ranking.rejected)
