@@ -118,22 +118,16 @@ def sample_objects(belief: Belief, count: int, *, rng: np.random.Generator) -> S
 
 
 def _with_sense(hypothesis: Hypothesis, reference: Axis) -> Hypothesis:
-    """The hypothesis with its direction on the prior's side; the chart's basis turns along."""
+    """The hypothesis with its direction on the prior's side; the chart's basis turns along.
+
+    `basis_across` gives (e1, e2) at u and (e1, -e2) at -u, and a change of u is minus that of -u.
+    """
     if hypothesis.axis.direction @ reference.direction >= 0:
         return hypothesis
-    flip = _chart_flip(hypothesis.axis)
+    flip = np.diag([1.0, -1.0, -1.0, 1.0])
     axis = Axis(hypothesis.axis.point, -hypothesis.axis.direction)
     covariance = frozen(flip @ hypothesis.covariance @ flip.T)
     return replace(hypothesis, axis=axis, covariance=covariance)
-
-
-def _chart_flip(axis: Axis) -> Array:
-    """Coordinates in the chart at (point, -u) of those in the chart at (point, u).
-
-    `basis_across` gives (e1, e2) at u and (e1, -e2) at -u. A tilt w of u is -w of -u as a change
-    of components along the same vectors.
-    """
-    return np.diag([1.0, -1.0, -1.0, 1.0])
 
 
 def _touched_band(

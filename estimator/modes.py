@@ -32,7 +32,7 @@ class Peak:
         contacts_information: The contacts' part of it, with the sensor's prior on delta, (5, 5).
         log_evidence: Laplace's, up to a constant common to all peaks.
         label_weights: Probability of each row being the parallel's at this line, (n, 2).
-        chi_square: Of the contacts under their likelier labels.
+        chi_square: Of the contacts, each label weighed by its probability.
     """
 
     point: Array

@@ -46,7 +46,7 @@ def judge(
 ) -> tuple[Verdict, tuple[str, ...]]:
     """The verdict and its reasons."""
     if len(contacts) < 2:
-        return "undetermined", (f"{len(contacts)} contacts: two at least can fix an axis",)
+        return "undetermined", (f"fewer than two contacts ({len(contacts)}) fix no axis",)
     reasons = _misfit_reasons(p_value) + _coincidence_reasons(readings) + _sphere_reasons(readings)
     for peak, probability in peaks:
         if probability > MENTIONED:

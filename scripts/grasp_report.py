@@ -18,7 +18,8 @@ from sim_sensor.world import World
 
 def print_round(console: Console, step: Step, number: int) -> None:
     plan = step.plan
-    console.print(f"\n[bold]Round {number}[/]: {len(plan.probes)} touches in one placement")
+    touches = "1 touch" if len(plan.probes) == 1 else f"{len(plan.probes)} touches"
+    console.print(f"\n[bold]Round {number}[/]: {touches} in one placement")
     table = Table(box=SIMPLE_HEAD, pad_edge=False)
     for heading in ("finger", "meridian", "height", "reach residual", "felt"):
         table.add_column(heading, justify="left" if heading == "finger" else "right")

@@ -100,6 +100,14 @@ def test_table_8_counts_of_120_triples(origin, tolerance, unique, correct):
     assert abs(np.sum(found[:, 0] < 20.0) - correct) <= 1
 
 
+@pytest.mark.parametrize(("tolerance", "successes"), [(0.005, 5), (0.01, 6), (0.05, 4)])
+def test_the_rank_test_turns_three_to_five_percent_into_a_right_axis(tolerance, successes):
+    """Within 10 degrees and 0.3 inch, the README's comparison; theory.md, section 2."""
+    found, _ = unique_triples(MACHINE, tolerance)
+    success = np.sum((found[:, 0] < 10.0) & (found[:, 1] < 0.3))
+    assert abs(success - successes) <= 1
+
+
 def test_table_8_false_axes_cluster_about_100_degrees_and_true_ones_are_as_reported():
     found, _ = unique_triples(MACHINE, 0.005)
     right = found[:, 0] < 20.0
