@@ -35,7 +35,9 @@ class SensorNoise:
         curvature_scale: Relative, common to both curvatures of a contact [-].
         flat: Below this a curvature is reported as saturated (NaN) [1/m]; infinite where
             curvatures were not measured at all, then `direction` is all the directions' noise.
-        direction_offset: Rotation common to all readings of a session, about the normal [rad].
+        direction_offset: Rotation about the normal common to all readings of one sensor [rad].
+        scale_offset: Log of measured over true radius, common to all readings of one sensor [-].
+        position_bias: Each coordinate of a shift common to all readings of one finger [m].
     """
 
     position: float
@@ -46,6 +48,8 @@ class SensorNoise:
     curvature_scale: float
     flat: float
     direction_offset: float = 0.0
+    scale_offset: float = 0.0
+    position_bias: float = 0.0
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -67,6 +71,8 @@ class Contact:
         curvatures: The curvature along each row, convex positive [1/m], shape (2,). NaN where the
             sensor saturates: flatter than it resolves.
         noise: How far off all this may be.
+        finger: Whose tip touched: contacts of one finger share its position bias.
+        sensor: What was touched with: contacts of one sensor share its direction and scale offset.
     Raises:
         ValueError: Wrong shape, not finite, not unit, or normal and directions not orthogonal.
     """
@@ -76,6 +82,8 @@ class Contact:
     directions: Array
     curvatures: Array
     noise: SensorNoise = field(repr=False)
+    finger: str = ""
+    sensor: str = ""
 
     def __post_init__(self) -> None:
         position = finite_array("contact position", self.position, (3,))
