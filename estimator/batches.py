@@ -8,10 +8,7 @@ import numpy as np
 
 from estimator.axis import Axis
 from estimator.contact import Contact, SensorNoise
-from estimator.estimate import Verdict
 from estimator.vectors import Array, Index
-
-VERDICTS: tuple[Verdict, ...] = ("determined", "ambiguous", "undetermined")
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,9 +53,14 @@ class ContactSets:
     def __len__(self) -> int:
         return len(self.positions)
 
+    @property
+    def owners(self) -> tuple[tuple[str, str], ...]:
+        """Finger and sensor of the j-th contact of every set."""
+        n = self.positions.shape[1]
+        return tuple(zip(self.fingers or ("",) * n, self.sensors or ("",) * n, strict=True))
+
     def take(self, i: int) -> tuple[Contact, ...]:
         """Set i as contacts."""
-        n = self.positions.shape[1]
         return tuple(
             Contact(
                 self.positions[i, j],
@@ -66,10 +68,10 @@ class ContactSets:
                 self.directions[i, j],
                 self.curvatures[i, j],
                 self.noise,
-                finger=self.fingers[j] if self.fingers else "",
-                sensor=self.sensors[j] if self.sensors else "",
+                finger=finger,
+                sensor=sensor,
             )
-            for j in range(n)
+            for j, (finger, sensor) in enumerate(self.owners)
         )
 
 
@@ -81,7 +83,7 @@ class AxisEstimates:
         points, directions: Of the likeliest axis, (B, 3).
         covariances: In the chart at that axis (`estimator.axis`), (B, 4, 4).
         probabilities: Of that axis against the other hypotheses, (B,).
-        verdicts: Index into VERDICTS, (B,).
+        verdicts: Index into estimator.estimate.VERDICTS, (B,).
         p_values: How often a true surface of revolution fits worse, (B,).
         parallel_rows: Probability that row 0 is the parallel's at that axis, (B, n).
         label_probabilities: Of the likeliest labelling, over all hypotheses, (B,).

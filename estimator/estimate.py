@@ -12,6 +12,7 @@ from estimator.planes import Labelling
 from estimator.vectors import Array
 
 Verdict = Literal["determined", "ambiguous", "undetermined"]
+VERDICTS: tuple[Verdict, ...] = ("determined", "ambiguous", "undetermined")
 
 CHI_95 = 2.4477  # radius of the 95 % disc of a plane Gaussian, in standard deviations
 
@@ -24,7 +25,7 @@ class Hypothesis:
         axis: Its point is the chart's origin.
         covariance: Of (t1, t2, w1, w2) in the chart at `axis` [m, m, rad, rad], (4, 4).
         probability: Against the other hypotheses.
-        direction_offset: Common rotation of the directions about the normal at this axis [rad].
+        direction_offset: Common rotation of the first sensor's directions at this axis [rad].
         parallel_rows: For each contact the probability that row 0 is the parallel's, (n,).
     """
 
@@ -46,6 +47,39 @@ class Hypothesis:
 
 
 @dataclass(frozen=True, eq=False)
+class FreeMotion:
+    """A motion of the axis that the touches leave open.
+
+    Args:
+        pivot: A point of the axis that it does not move, for a shift any point [m], (3,).
+        shift: Where it moves the axis' point, across the axis [m], (3,).
+        tilt: Rotation vector of the axis about the pivot [rad], (3,).
+
+    Shift and tilt are one standard deviation of it, as the touches alone limit them.
+    """
+
+    pivot: Array
+    shift: Array
+    tilt: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Nuisance:
+    """What an estimate found out about the sensor or the finger besides the axis.
+
+    Args:
+        name: "direction_offset" [rad], "scale_offset" [-] or "position_bias" [m].
+        owner: Name of the sensor or finger.
+        mean, sd: Shape (1,), for the position bias (3,) in the world.
+    """
+
+    name: str
+    owner: str
+    mean: Array
+    sd: Array
+
+
+@dataclass(frozen=True, eq=False)
 class AxisEstimate:
     """The axis, with everything that must be known before it is trusted.
 
@@ -57,6 +91,9 @@ class AxisEstimate:
             several axes fit. `undetermined`: some motion of the axis is free.
         reasons: Why, in words.
         p_value: How often a true surface of revolution would fit worse than this one.
+        free_motions: Of the likeliest axis, freest first.
+        nuisances: What else was estimated, at the likeliest axis.
+        gross_errors: Probability that each contact is grossly wrong, (n,).
     """
 
     hypotheses: tuple[Hypothesis, ...]
@@ -64,6 +101,9 @@ class AxisEstimate:
     verdict: Verdict
     reasons: tuple[str, ...]
     p_value: float
+    free_motions: tuple[FreeMotion, ...]
+    nuisances: tuple[Nuisance, ...]
+    gross_errors: Array
 
     @property
     def best(self) -> Hypothesis:

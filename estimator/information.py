@@ -2,18 +2,38 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from itertools import combinations, product
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
+from estimator.assumptions import Assumptions
+from estimator.compiled import across, compiled
 from estimator.contact import SensorNoise
-from estimator.likelihood import Lines, evaluate
-from estimator.posterior import Posterior, climb
+from estimator.likelihood import (
+    LOCAL,
+    fill_derivatives,
+    fill_motions,
+    fit_of,
+    seen_from,
+    vector,
+)
+from estimator.modes import DRAMATICALLY_WORSE, find_modes
+from estimator.posterior import cost_at, work_space
 from estimator.prior import AxisPrior
+from estimator.problem import (
+    Background,
+    Nuisances,
+    Owner,
+    background_of,
+    nuisance_states,
+    nuisances_of,
+)
 from estimator.readings import Readings, exact_readings
 from estimator.surface import Geometry
-from estimator.vectors import Array, Index, cross, unit
+from estimator.vectors import Array
+
+WITH_ROTATION = 5  # parameters: the line's four and the common rotation
 
 
 def contact_information(
@@ -30,10 +50,30 @@ def contact_information(
     Returns:
         (B, n, 5, 5) over (t1, t2, w1, w2, delta) in the chart at each axis.
     """
-    terms = evaluate(
-        exact_readings(geometry, noise), Lines(points, directions, np.zeros(len(points)))
-    )
-    return np.asarray(terms.fisher[:, :, 0])
+    readings = exact_readings(geometry, noise)
+    out = np.zeros((*readings.shape[:2], WITH_ROTATION, WITH_ROTATION))
+    lines = np.ascontiguousarray(np.concatenate([points, directions], axis=1))
+    _fill_information(readings, lines, out)
+    return out
+
+
+@compiled
+def _fill_information(readings: Readings, lines: Array, out: Array) -> None:
+    gradient, fisher = np.zeros(LOCAL), np.zeros((LOCAL, LOCAL))
+    rows = np.zeros((8, LOCAL))
+    for s in range(readings.shape[0]):
+        a, u = vector(lines[s], 0), vector(lines[s], 3)
+        E1, E2 = across(u)
+        for i in range(readings.shape[1]):
+            row = readings[s, i]
+            seen = seen_from(row, a, u, (0.0, 0.0, 0.0), 0.0)
+            fill_motions(seen, E1, E2, rows)
+            fit = fit_of(row, seen, 0.0)
+            fill_derivatives(row, seen, fit, 1.0, 0.0, gradient, fisher, rows, WITH_ROTATION)
+            for j in range(WITH_ROTATION):
+                for k in range(j + 1):
+                    out[s, i, j, k] = fisher[j, k]
+                    out[s, i, k, j] = fisher[j, k]
 
 
 def predicted_covariance(information: Array, prior: Array, direction_offset: float) -> Array:
@@ -63,65 +103,30 @@ class Expected:
 def label_log_odds(expected: Expected, noise: SensorNoise, prior: AxisPrior | None) -> Array:
     """How much likelier the right labelling will look than the worst wrong one, (P,).
 
-    For every wrong labelling the best line is sought from the true axis and from the lines its
-    contact pairs fix; the odds are the difference of the costs, without noise. Zero and below
-    means that the labels cannot be told; 3 is twenty to one.
+    The estimator itself looks for every line that explains the exact contacts; the odds are the
+    difference in cost between the true line and the best one with a wrong label. Zero and below
+    means that the labels cannot be told; 3 is twenty to one; where no wrong line comes near, the
+    odds are those beyond which the estimator drops a line.
     """
     readings = exact_readings(expected.geometry, noise)
-    if prior is not None:
-        readings = replace(readings, size=(prior.radius, prior.radius_sd))
-    count, m = readings.p.shape[:2]
-    problem, lines, labels = _wrong_starts(readings, expected)
-    wrong = _posterior(readings.take(problem), expected.points[problem], prior)
-    _, terms = climb(wrong, lines, labels, iterations=8, gain_at_rest=1e-1)
-    best = np.full(count, np.inf)
-    np.minimum.at(best, problem, terms.cost)
-    truth = Lines(expected.points, expected.directions, np.zeros(count))
-    right = _posterior(readings, expected.points, prior)
-    return np.asarray(best - right.at(truth, np.zeros((count, m), dtype=np.intp)).cost)
+    owned = [Owner(noise)] * readings.shape[1]
+    nuisances = nuisances_of(owned, nuisance_states(owned, Assumptions()))
+    priors: Sequence[AxisPrior] = [] if prior is None else [prior]
+    background = background_of(readings, priors, (), slope=np.inf, gross=0.0)
+    modes = find_modes(readings, nuisances, background)
+    wrong = np.any(modes.parallel_rows < 0.5, axis=2)
+    cost = np.where(wrong, modes.cost, np.inf).min(axis=1)
+    truth = np.zeros((len(readings), modes.x.shape[2]))
+    truth[:, :3], truth[:, 3:6] = expected.points, expected.directions
+    right = np.empty(len(readings))
+    _fill_costs(readings, nuisances, background, truth, right)
+    return np.asarray(np.minimum(cost - right, DRAMATICALLY_WORSE))
 
 
-def _posterior(readings: Readings, points: Array, prior: AxisPrior | None) -> Posterior:
-    centroid = readings.p.mean(axis=(0, 1))
-    spread = float(np.sqrt(np.mean(np.sum((readings.p - points[:, None]) ** 2, axis=-1))))
-    origin = prior.axis.point if prior is not None else centroid
-    return Posterior(readings, origin, spread, prior)
-
-
-def _wrong_starts(readings: Readings, expected: Expected) -> tuple[Index, Lines, Index]:
-    """Problem index, line and labels of every start: 2^m - 1 labellings, true axis and pairs."""
-    count, m = readings.p.shape[:2]
-    wrong = np.array(list(product((0, 1), repeat=m))[1:], dtype=np.intp)
-    sources: list[tuple[Array, Array]] = []
-    for _ in wrong:
-        sources.append((expected.points, expected.directions))
-    rows = [np.broadcast_to(row, (count, m)) for row in wrong]
-    for row in wrong:
-        for i, j in combinations(range(m), 2):
-            sources.append(_pair_line(readings, i, j, int(row[i]), int(row[j])))
-            rows.append(np.broadcast_to(row, (count, m)))
-    a = np.concatenate([source[0] for source in sources])
-    u = np.concatenate([source[1] for source in sources])
-    problem = np.tile(np.arange(count), len(sources))
-    labels = np.concatenate(rows).astype(np.intp)
-    return problem.astype(np.intp), Lines(a, u, np.zeros(len(a))), labels
-
-
-def _pair_line(readings: Readings, i: int, j: int, row_i: int, row_j: int) -> tuple[Array, Array]:
-    """Where two planes meet in each problem; nearly equal planes give some line in them."""
-    N1, N2 = readings.k[:, i, row_i], readings.k[:, j, row_j]
-    centre = readings.p.mean(axis=1)
-    u = cross(N1, N2)
-    u = unit(u + 1e-3 * cross(N1, readings.n[:, i]))
-    gap = np.stack(
-        [
-            np.sum(N1 * (readings.p[:, i] - centre), axis=1),
-            np.sum(N2 * (readings.p[:, j] - centre), axis=1),
-            np.zeros(len(centre)),
-        ],
-        axis=1,
-    )
-    system = np.stack([N1, N2, u], axis=1)
-    regular = np.swapaxes(system, 1, 2) @ system + 1e-4 * np.eye(3)
-    a = np.linalg.solve(regular, np.swapaxes(system, 1, 2) @ gap[..., None])[..., 0]
-    return centre + a, u
+@compiled
+def _fill_costs(
+    readings: Readings, nuisances: Nuisances, background: Background, x: Array, out: Array
+) -> None:
+    work = work_space(x.shape[1] - 2, readings.shape[1])
+    for s in range(readings.shape[0]):
+        out[s] = cost_at(readings, nuisances, background, s, x[s], False, work)

@@ -1,247 +1,290 @@
-"""How well lines explain readings: cost, gradient and Fisher information, all at once.
+"""How well a line explains one contact: cost, gradient and Fisher information.
 
 For a line (a, u) a contact at p lies at radius r = |u x (p - a)|, with e = u x (p - a) / r along
 its parallel and rad = e x u away from the axis. On a surface of revolution, exactly,
 
-    alpha = k_z . e = 0        the meridian direction lies in the meridian plane, eq. (24)
-    beta  = n . e = 0          and so does the normal, eq. (22)
-    gamma = kappa_theta - (n . rad) / r = 0                               eqs (2), (20)
+    beta = n . e = 0                   the normal lies in the meridian plane, eq. (22)
+    K_tz = 0                           and so does a principal direction, eq. (24)
+    K_tt = (n . rad) / r               the curvature of the parallel, eqs (2), (20)
+
+where K_tt, K_tz are entries of the *measured curvature tensor* in the frame of e. With theta the
+angle from row 0 of the measured directions to e, about the normal,
+
+    K_tt = K_mean + D cos 2 theta,     K_tz = -D sin 2 theta,     D = (kappa_0 - kappa_1) / 2.
+
+The sensor's noise sits on the tensor, so these two are Gaussian as they stand: a direction is known
+to sd / |kappa_0 - kappa_1| without being told, an umbilic says nothing of it, and the labels need
+no sum: K_tz vanishes where row 0 is the parallel's (theta = 0) and where row 1 is (theta = 90 deg).
 
 Position, slope and meridian curvature of the contact are unknowns of its own, so these three are
-all it says about the line. The error of the position turns e by sp/r, which makes alpha and beta
-correlated:
+all it says about the line. An error of the position along e turns e by sp / r, which moves beta
+and K_tz together:
 
-    C = [[s_psi^2, 0], [0, s_n^2]] + (sp/r)^2 m m^T,   m = (k_z . rad, n . rad)
+    C = diag(s_n^2, s_tz^2) + (sp / r)^2 m m^T,   m = (n . rad, 2 D cos 2 theta  n . u)
 
 and log det C belongs to the cost: without it a line through the contact, where r = 0, wins.
-A rotation delta of the directions about the normal, common to all contacts, is the fifth unknown.
+Errors of radii are relative as much as absolute, so K_tt is compared after
+F(K) = asinh(s K / sd) / s, which gives both a variance of one.
 
-Arrays: S lines, n contacts, 2 labels (which row of `directions` is the parallel's), 5 parameters
-(t1, t2, w1, w2, delta) in the chart of `estimator.axis` at the line itself.
+Parameters of one contact: (t1, t2, w1, w2) of the line in the chart at itself, the common rotation
+delta of its sensor's directions and log-scale lambda of its radii, the position bias (3) of its
+finger. Everything is a function of beta, m_n = n . rad, m_u = n . u, r, theta and lambda, and
+these move by four scalars: A = tau . e / r, B = w . e, C = w . rad, R = -tau . rad, where
+tau = t + z w is how far the line shifts at the contact's height z.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from math import asinh, cos, exp, log, pi, sin, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
-from estimator.readings import Readings
-from estimator.vectors import Array, Index, basis_across, cross, unit
+from estimator.compiled import V3, along, compiled, cross3, dot, scaled
+from estimator.readings import (
+    CENSORED,
+    CONVEX,
+    EDGE,
+    K0,
+    K1,
+    KAPPA,
+    NORMAL,
+    POSITION,
+    SD_DIRECTION,
+    SD_K_TT,
+    SD_K_TZ,
+    SD_NORMAL,
+    SD_POSITION,
+    SD_SHARE,
+)
+from estimator.vectors import Array
 
 INSIDE = 0.05  # softness of "the axis lies behind the surface", on n . rad
-ON_AXIS = 1e-5  # a contact nearer to a line than this counts as this far away [m]
+LOCAL = 9  # parameters of one contact: t1 t2 w1 w2 delta lambda b1 b2 b3
+A, B, C, R, BETA, MN, MU, THETA = range(8)  # rows of the work space
+LOG_2PI = log(2.0 * pi)
 
 
-@dataclass(frozen=True, eq=False)
-class Lines:
-    """S lines with a common rotation of the directions: points (S, 3), units (S, 3), (S,)."""
+class Seen(NamedTuple):
+    """A contact as a line sees it; c2, s2 are cos and sin of 2 theta."""
 
-    a: Array
-    u: Array
-    delta: Array
-
-    def take(self, index: Index) -> Lines:
-        return Lines(self.a[index], self.u[index], self.delta[index])
-
-    def in_basis(self, v: Array) -> Array:
-        """Components (S, 2) of vectors (S, 3) across each line."""
-        return np.asarray(np.einsum("sjx,sx->sj", basis_across(self.u), v))
-
-    def moved(self, step: Array, origin: Array) -> Lines:
-        """Step (S, 5) in the chart; the point is then put at the foot of `origin`."""
-        basis = basis_across(self.u)
-        u = unit(self.u + np.einsum("sj,sjx->sx", step[:, 2:4], basis))
-        a = self.a + np.einsum("sj,sjx->sx", step[:, :2], basis)
-        return Lines(foot(a, u, origin), u, self.delta + step[:, 4])
+    r: float
+    z: float
+    e: V3
+    rad: V3
+    beta: float
+    m_n: float
+    m_u: float
+    c2: float
+    s2: float
 
 
-@dataclass(frozen=True, eq=False)
-class Terms:
-    """Negative log likelihood of each contact under each label, with derivatives."""
+class Fit(NamedTuple):
+    """Its residuals, whitened (a, b, c), and what their derivatives need."""
 
-    cost: Array  # (S, n, 2)
-    gradient: Array  # (S, n, 2, 5)
-    fisher: Array  # (S, n, 2, 5, 5)
-    chi_square: Array  # (S, n, 2): the part of twice the cost that is a sum of squares
+    a: float
+    b: float
+    c: float
+    l11: float
+    l21: float
+    l22: float
+    tau: float
+    w: float  # 2 D cos 2 theta
+    v: float  # 2 D sin 2 theta
+    curve: float  # exp(-lambda) / r
+    F_g: float  # dF/dK at the prediction, and at the reading
+    F_K: float
+    K: float
+    width: float  # variance of the third residual before whitening
+    log_density: float
 
 
-def foot(a: Array, u: Array, origin: Array) -> Array:
-    """Point of each line nearest to the origin, (S, 3)."""
-    return np.asarray(a + np.sum((origin - a) * u, axis=-1, keepdims=True) * u)
+@compiled
+def vector(row: Array, first: int) -> V3:
+    return (row[first], row[first + 1], row[first + 2])
 
 
-def evaluate(readings: Readings, lines: Lines) -> Terms:
-    """Cost of every contact under both labels at every line, with exact gradient.
+@compiled
+def seen_from(row: Array, a: V3, u: V3, bias: V3, delta: float) -> Seen:
+    """A contact (a row of `Readings`) about the line (a, u)."""
+    n = vector(row, NORMAL)
+    q = along(along(vector(row, POSITION), -1.0, bias), -1.0, a)
+    v = cross3(u, q)
+    r = max(sqrt(dot(v, v)), 1e-300)
+    e = scaled(1.0 / r, v)
+    rad = cross3(e, u)
+    x0, x1 = dot(vector(row, K0), e), dot(vector(row, K1), e)
+    square = max(x0 * x0 + x1 * x1, 1e-300)
+    c2, s2 = (x0 * x0 - x1 * x1) / square, 2.0 * x0 * x1 / square
+    if delta != 0.0:
+        c, s = cos(2.0 * delta), sin(2.0 * delta)
+        c2, s2 = c2 * c - s2 * s, s2 * c + c2 * s
+    return Seen(r, dot(q, u), e, rad, dot(n, e), dot(n, rad), dot(n, u), c2, s2)
 
-    The information is that of a Gaussian whose mean and covariance both depend on the line:
-    J^T C^-1 J + tr(C^-1 dC C^-1 dC)/2.
+
+@compiled
+def fit_of(row: Array, seen: Seen, scale: float) -> Fit:
+    """Residuals of a contact, whitened by their covariance, and their log density."""
+    D = 0.5 * (row[KAPPA] - row[KAPPA + 1])
+    w, v = 2.0 * D * seen.c2, 2.0 * D * seen.s2
+    tau = (row[SD_POSITION] / seen.r) ** 2
+    C_bb = row[SD_NORMAL] ** 2 + tau * seen.m_n**2
+    C_bx = tau * w * seen.m_n * seen.m_u
+    C_xx = row[SD_K_TZ] ** 2 + (2.0 * D * row[SD_DIRECTION]) ** 2 + tau * (w * seen.m_u) ** 2
+    l11 = sqrt(C_bb)
+    l21 = C_bx / l11
+    l22 = sqrt(max(C_xx - l21**2, 1e-12 * C_xx))
+    a = seen.beta / l11
+    b = (-0.5 * v - l21 * a) / l22
+    curve = (exp(-scale) if scale != 0.0 else 1.0) / seen.r
+    K = 0.5 * (row[KAPPA] + row[KAPPA + 1] + w)
+    censored = row[CENSORED] if seen.c2 >= 0.0 else row[CENSORED + 1]
+    c, F_g, F_K, width, volume = _curvature_fit(row, seen.m_n * curve, K, censored > 0.0)
+    if F_K > 0.0:
+        width = 1.0 + (F_g * seen.m_u * curve) ** 2 * C_bb
+        c /= sqrt(width)
+    volume *= C_bb * l22 * l22 * width
+    log_density = -0.5 * (a * a + b * b + c * c + log(volume))
+    return Fit(a, b, c, l11, l21, l22, tau, w, v, curve, F_g, F_K, K, width, log_density)
+
+
+@compiled
+def _curvature_fit(
+    row: Array, g: float, K: float, censored: bool
+) -> tuple[float, float, float, float, float]:
+    """The third residual, dF/dK at the prediction g and at the reading K (zero where there is no
+    number to compare), a width of one, and the squared volume the reading takes.
+
+    A curvature too flat to read costs nothing below the edge: the chance of that reading is one,
+    against a density for readings in numbers, hence the volume.
     """
-    g = _geometry(readings, lines)
-    rotated, turned = _directions(readings, lines.delta)
-    k_z, dk_z = rotated[..., ::-1, :], turned[..., ::-1, :]  # label i: row i is the parallel's
-    alpha, d_alpha = _dot_e(k_z, g)
-    beta, d_beta = _dot_e(readings.n[..., None, :], g)
-    m_k, dm_k = _dot_rad(k_z, g)
-    m_n, dm_n = _dot_rad(readings.n[..., None, :], g)
-    d_alpha[..., 4] = np.einsum("...x,...x->...", dk_z, g.e[:, :, None])
-    dm_k[..., 4] = np.einsum("...x,...x->...", dk_z, g.rad[:, :, None])
-    beta, d_beta, m_n, dm_n = (np.repeat(x, 2, axis=2) for x in (beta, d_beta, m_n, dm_n))
-    plane = _plane_terms(
-        readings, g, np.stack([alpha, beta]), np.stack([d_alpha, d_beta]),
-        np.stack([m_k, m_n]), np.stack([dm_k, dm_n]),
-    )  # fmt: skip
-    bend = _curvature_terms(readings, g, m_n, dm_n)
-    parts = (plane, bend, _inside_terms(m_n, dm_n), _size_terms(readings, g))
-    return Terms(
-        cost=sum((x.cost for x in parts), np.zeros(())),
-        gradient=sum((x.gradient for x in parts), np.zeros(())),
-        fisher=sum((x.fisher for x in parts), np.zeros(())),
-        chi_square=plane.chi_square + bend.chi_square,
-    )
+    sd, share, edge = row[SD_K_TT], row[SD_SHARE], row[EDGE]
+    if not edge < np.inf:
+        return 0.0, 0.0, 0.0, 1.0, 1.0
+    if censored:
+        soft = max(sd, 0.5 * edge)
+        beyond = (abs(g) - edge) / soft
+        volume = (2.0 * edge) ** 2 / (2.0 * pi)
+        return -np.sign(g) * max(beyond, 0.0), 1.0 / soft, 0.0, 1.0, volume
+    V_g, V_K = sd**2 + (share * g) ** 2, sd**2 + (share * K) ** 2
+    gap = (K - g) / sd
+    if share > 1e-6:
+        gap = (asinh(share * K / sd) - asinh(share * g / sd)) / share
+    return gap, 1.0 / sqrt(V_g), 1.0 / sqrt(V_K), 1.0, V_K
 
 
-@dataclass(frozen=True, eq=False)
-class _Geometry:
-    """Frame (rad, e, u) and radius of each contact about each line, and how they move.
+@compiled
+def fill_motions(seen: Seen, E1: V3, E2: V3, rows: Array) -> None:
+    """How A, B, C, R, beta, m_n, m_u and theta move with the parameters, into rows (8, 9)."""
+    for k in range(4):
+        for j in range(LOCAL):
+            rows[k, j] = 0.0
+    for j in range(2):
+        E = E1 if j == 0 else E2
+        e, rad = dot(E, seen.e), dot(E, seen.rad)
+        rows[A, j], rows[R, j] = e / seen.r, -rad
+        rows[A, 2 + j], rows[R, 2 + j] = seen.z * e / seen.r, -seen.z * rad
+        rows[B, 2 + j], rows[C, 2 + j] = e, rad
+    for j in range(3):
+        rows[A, 6 + j], rows[R, 6 + j] = seen.e[j] / seen.r, -seen.rad[j]
+    across = max(1.0 - seen.beta**2, 1e-12)  # of e's projection into the tangent plane, squared
+    for j in range(LOCAL):
+        A_j, B_j, C_j = rows[A, j], rows[B, j], rows[C, j]
+        rows[BETA, j] = A_j * seen.m_n - B_j * seen.m_u
+        rows[MN, j] = -A_j * seen.beta - C_j * seen.m_u
+        rows[MU, j] = B_j * seen.beta + C_j * seen.m_n
+        rows[THETA, j] = -(A_j * seen.m_u + B_j * seen.m_n) / across
+    rows[THETA, 4] = 1.0
 
-    de = c1 rad + c2 u,  drad = -c1 e - f u,  each of c1, c2, f, dr of shape (S, n, 5).
+
+@compiled
+def fill_derivatives(
+    row: Array, seen: Seen, fit: Fit, trust: float, normal_only: float,
+    gradient: Array, fisher: Array, rows: Array, locals_: int,
+) -> None:  # fmt: skip
+    """Gradient of -log density and information J^T C^-1 J, for the first `locals_` parameters.
+
+    `rows` holds the motions and gives up A, B, C for the whitened Jacobian.
     """
-
-    e: Array
-    rad: Array
-    u: Array
-    r: Array
-    c1: Array
-    c2: Array
-    f: Array
-    dr: Array
-
-
-def _geometry(readings: Readings, lines: Lines) -> _Geometry:
-    q = readings.p - lines.a[:, None]
-    u = np.broadcast_to(lines.u[:, None], q.shape)
-    v = cross(u, q)
-    r = np.maximum(np.linalg.norm(v, axis=-1), ON_AXIS)
-    e = v / r[..., None]
-    rad = cross(e, u)
-    E = basis_across(lines.u)  # (S, 2, 3)
-    dv = np.zeros((*q.shape[:2], 5, 3))
-    dv[:, :, 0], dv[:, :, 1] = -E[:, None, 1], E[:, None, 0]  # -u x E_j
-    dv[:, :, 2:4] = cross(E[:, None], q[:, :, None])
-    f = np.zeros((*q.shape[:2], 5))
-    f[..., 2:4] = np.einsum("sjx,snx->snj", E, rad)
-    return _Geometry(
-        e, rad, u, r,
-        c1=np.einsum("snjx,snx->snj", dv, rad) / r[..., None],
-        c2=np.einsum("snjx,snx->snj", dv, u) / r[..., None],
-        f=f,
-        dr=np.einsum("snjx,snx->snj", dv, e),
-    )  # fmt: skip
-
-
-def _directions(readings: Readings, delta: Array) -> tuple[Array, Array]:
-    """Directions turned back by delta about the normal, and their derivative, (S, n, 2, 3)."""
-    crossed = cross(readings.n[..., None, :], readings.k)
-    c, s = np.cos(delta)[:, None, None, None], np.sin(delta)[:, None, None, None]
-    return c * readings.k - s * crossed, -s * readings.k - c * crossed
-
-
-def _dot_e(x: Array, g: _Geometry) -> tuple[Array, Array]:
-    """x . e for x (., n, l, 3), and its derivative at constant x."""
-    value = np.einsum("...x,...x->...", x, g.e[:, :, None])
-    along_rad = np.einsum("...x,...x->...", x, g.rad[:, :, None])[..., None]
-    along_u = np.einsum("...x,...x->...", x, g.u[:, :, None])[..., None]
-    return value, along_rad * g.c1[:, :, None] + along_u * g.c2[:, :, None]
+    m_n, m_u, l11, l21, l22 = seen.m_n, seen.m_u, fit.l11, fit.l21, fit.l22
+    C_bb, C_xx, C_bx = l11 * l11, l22 * l22 + l21 * l21, l21 * l11
+    det = C_bb * l22 * l22
+    y_x = fit.b / l22
+    y_b = (fit.a - l21 * y_x) / l11
+    bb, bx, xx = 0.5 * (C_xx / det - y_b**2), -C_bx / det - y_b * y_x, 0.5 * (C_bb / det - y_x**2)
+    plain = 0.5 * (1.0 - fit.a**2) / C_bb
+    g, share, root = m_n * fit.curve, row[SD_SHARE], sqrt(fit.width)
+    T = fit.F_g * m_u * fit.curve
+    tau, w = fit.tau, fit.w
+    for j in range(locals_):
+        d_mn, d_mu, d_theta, d_r = rows[MN, j], rows[MU, j], rows[THETA, j], rows[R, j] / seen.r
+        d_scale = 1.0 if j == 5 else 0.0
+        d_w, d_tau = -2.0 * fit.v * d_theta, -2.0 * tau * d_r
+        d_bb = d_tau * m_n**2 + 2.0 * tau * m_n * d_mn
+        d_bx = d_tau * w * m_n * m_u
+        d_bx += tau * (d_w * m_n * m_u + w * (d_mn * m_u + m_n * d_mu))
+        d_xx = d_tau * (w * m_u) ** 2 + 2.0 * tau * w * m_u * (d_w * m_u + w * d_mu)
+        j_a = rows[BETA, j] / l11
+        j_b = (-w * d_theta - l21 * j_a) / l22
+        d_g = fit.curve * d_mn - g * (d_r + d_scale)
+        j_c = 0.0
+        slope = fit.a * j_a + fit.b * j_b + bb * d_bb + bx * d_bx + xx * d_xx
+        if fit.F_K > 0.0:
+            d_K = -fit.v * d_theta
+            d_T = -((share * fit.F_g) ** 2) * g * d_g * T
+            d_T += fit.F_g * fit.curve * d_mu - T * (d_r + d_scale)
+            d_width = 2.0 * T * d_T * C_bb + T**2 * d_bb
+            j_c = (fit.F_K * d_K - fit.F_g * d_g) / root
+            slope += fit.c * j_c + 0.5 * (1.0 - fit.c**2) / fit.width * d_width
+            slope += (share * fit.F_K) ** 2 * fit.K * d_K
+        elif fit.c != 0.0:
+            j_c = -fit.F_g * d_g
+            slope += fit.c * j_c
+        gradient[j] = trust * slope + normal_only * (fit.a * j_a + plain * d_bb)
+        rows[A, j], rows[B, j], rows[C, j] = j_a, j_b, j_c
+    for j in range(locals_):
+        for k in range(j + 1):
+            both = rows[A, j] * rows[A, k]
+            rest = rows[B, j] * rows[B, k] + rows[C, j] * rows[C, k]
+            fisher[j, k] = trust * (both + rest) + normal_only * both
 
 
-def _dot_rad(x: Array, g: _Geometry) -> tuple[Array, Array]:
-    """x . rad for x (., n, l, 3), and its derivative at constant x."""
-    value = np.einsum("...x,...x->...", x, g.rad[:, :, None])
-    along_e = np.einsum("...x,...x->...", x, g.e[:, :, None])[..., None]
-    along_u = np.einsum("...x,...x->...", x, g.u[:, :, None])[..., None]
-    return value, -along_e * g.c1[:, :, None] - along_u * g.f[:, :, None]
-
-
-def _plane_terms(
-    readings: Readings, g: _Geometry, error: Array, d_error: Array, m: Array, dm: Array
-) -> Terms:
-    """alpha and beta with their joint covariance; pairs (2, S, n, 2), derivatives one axis more.
-
-    Written out for the 2x2 matrix C: gradient J^T y + tr(C^-1 dC)/2 - y^T dC y/2, y = C^-1 error.
+@compiled
+def gross_errors(row: Array, seen: Seen, fit: Fit, gross: float) -> tuple[float, float, float]:
+    """Log density of a contact that is grossly wrong with probability `gross`, half of the time in
+    its directions and curvatures, half of the time altogether; and the probabilities that it is
+    right, and that its normal alone is.
     """
-    tau = (readings.var_p / g.r**2)[:, :, None]
-    d_tau = -2.0 * tau[..., None] * (g.dr / g.r[..., None])[:, :, None]
-    c_aa = readings.var_psi[:, :, None] + tau * m[0] ** 2
-    c_bb = readings.var_n[:, :, None] + tau * m[1] ** 2
-    c_ab = tau * m[0] * m[1]
-    det = c_aa * c_bb - c_ab**2
-    w_aa, w_bb, w_ab = c_bb / det, c_aa / det, -c_ab / det  # C^-1
-    y_a, y_b = w_aa * error[0] + w_ab * error[1], w_ab * error[0] + w_bb * error[1]
-    chi_square = error[0] * y_a + error[1] * y_b
-    m_a, m_b, t = m[0][..., None], m[1][..., None], tau[..., None]
-    d_aa = m_a * (d_tau * m_a + 2.0 * t * dm[0])
-    d_bb = m_b * (d_tau * m_b + 2.0 * t * dm[1])
-    d_ab = d_tau * m_a * m_b + t * (dm[0] * m_b + m_a * dm[1])
-    w_aa, w_bb, w_ab, y_a, y_b = (x[..., None] for x in (w_aa, w_bb, w_ab, y_a, y_b))
-    gradient = d_error[0] * y_a + d_error[1] * y_b
-    gradient += 0.5 * ((w_aa - y_a**2) * d_aa + (w_bb - y_b**2) * d_bb)
-    gradient += (w_ab - y_a * y_b) * d_ab
-    p_aa, p_ab = w_aa * d_aa + w_ab * d_ab, w_aa * d_ab + w_ab * d_bb  # C^-1 dC
-    p_ba, p_bb = w_ab * d_aa + w_bb * d_ab, w_ab * d_ab + w_bb * d_bb
-    weighted_a = w_aa * d_error[0] + w_ab * d_error[1]
-    weighted_b = w_ab * d_error[0] + w_bb * d_error[1]
-    left = np.stack([weighted_a, weighted_b, 0.5 * p_aa, 0.5 * p_ab, 0.5 * p_ba, 0.5 * p_bb], -1)
-    right = np.stack([d_error[0], d_error[1], p_aa, p_ba, p_ab, p_bb], -2)
-    return Terms(0.5 * (chi_square + np.log(det)), gradient, left @ right, chi_square)
+    k0, k1 = abs(row[KAPPA]), abs(row[KAPPA + 1])
+    D = 0.5 * abs(row[KAPPA] - row[KAPPA + 1])
+    sd_xx = sqrt(fit.l22**2 + fit.l21**2)
+    void = LOG_2PI / 2 - log(2.0 * max(D, 3.0 * sd_xx))
+    if row[EDGE] < np.inf:
+        void += LOG_2PI / 2 - log(max(k0, k1, 3.0 * row[SD_K_TT]))
+    right = fit.log_density + log(1.0 - gross)
+    turned = void - 0.5 * fit.a**2 - log(fit.l11) + log(0.5 * gross)
+    nothing = void + LOG_2PI / 2 - log(2.0) + log(0.5 * gross)
+    most = max(right, turned, nothing)
+    p0, p1, p2 = exp(right - most), exp(turned - most), exp(nothing - most)
+    total = p0 + p1 + p2
+    return most + log(total), p0 / total, p1 / total
 
 
-def _curvature_terms(readings: Readings, g: _Geometry, m_n: Array, dm_n: Array) -> Terms:
-    """gamma under each label: the row taken as the parallel must fit (n . rad) / r.
-
-    An error of the position along the normal moves the prediction by sp (n . rad) / r^2.
+@compiled
+def add_constraints(
+    row: Array, seen: Seen, slope: float, derivatives: bool,
+    gradient: Array, fisher: Array, rows: Array, locals_: int,
+) -> float:  # fmt: skip
+    """What an object gives: the axis lies behind every convex contact, n . rad > 0 by eq. (2);
+    and, where `slope` is finite, sin(slope of the profile) = n . u is about that small.
     """
-    r, dr = g.r[:, :, None], g.dr[:, :, None]
-    predicted = m_n / r
-    d_predicted = (dm_n - predicted[..., None] * dr) / r[..., None]
-    shift = predicted / r
-    d_shift = (d_predicted - shift[..., None] * dr) / r[..., None]
-    var_p = readings.var_p[:, :, None]
-    variance = readings.var_kappa + var_p * shift**2
-    d_variance = 2.0 * (var_p * shift)[..., None] * d_shift
-    gamma = (readings.kappa - predicted) / variance
-    chi_square = (readings.kappa - predicted) * gamma
-    slope = d_predicted / np.sqrt(variance)[..., None]
-    widening = d_variance / (np.sqrt(2.0) * variance[..., None])
-    return Terms(
-        0.5 * (chi_square + np.log(variance)),
-        -gamma[..., None] * d_predicted + 0.5 * (1.0 / variance - gamma**2)[..., None] * d_variance,
-        slope[..., :, None] * slope[..., None, :] + widening[..., :, None] * widening[..., None, :],
-        chi_square,
-    )
-
-
-def _inside_terms(m_n: Array, dm_n: Array) -> Terms:
-    """The axis lies behind every contact: n . rad = 1/sqrt(1 + r'^2) > 0, eq. (2)."""
-    short = np.maximum(-m_n, 0.0) / INSIDE
-    slope = np.where(m_n[..., None] < 0, dm_n, 0.0) / INSIDE
-    return Terms(
-        0.5 * short**2,
-        -short[..., None] * slope,
-        slope[..., :, None] * slope[..., None, :],
-        short**2,
-    )
-
-
-def _size_terms(readings: Readings, g: _Geometry) -> Terms:
-    """Radius of each contact against the believed size; n contacts weigh as much as one."""
-    mean, sd = readings.size
-    weight = 0.0 if np.isinf(sd) else 1.0 / (sd**2 * max(g.r.shape[1], 1))
-    short = (g.r - mean)[:, :, None]
-    slope = g.dr[:, :, None]
-    return Terms(
-        0.5 * weight * short**2,
-        weight * short[..., None] * slope,
-        weight * slope[..., :, None] * slope[..., None, :],
-        np.zeros_like(short),
-    )
+    short = -seen.m_n / INSIDE if row[CONVEX] > 0.0 and seen.m_n < 0.0 else 0.0
+    steep = seen.m_u / slope
+    if derivatives and (short > 0.0 or slope < np.inf):
+        sharp = 1.0 / INSIDE if short > 0.0 else 0.0
+        for j in range(locals_):
+            gradient[j] += steep / slope * rows[MU, j] - short * sharp * rows[MN, j]
+            for k in range(j + 1):
+                fisher[j, k] += sharp**2 * rows[MN, j] * rows[MN, k]
+                fisher[j, k] += rows[MU, j] * rows[MU, k] / slope**2
+    return 0.5 * short**2 + 0.5 * steep**2

@@ -1,150 +1,419 @@
-"""The density whose peaks are the possible axes, and the batched climb to those peaks.
+"""The density whose peaks are the possible axes, and the climb to those peaks.
 
-Given the axis, contacts are independent, so their labels are summed out one by one:
-
-    p(line | contacts) ~ prior(line) prod_i  1/2 [ p(contact_i | line, label 0) + ... label 1) ]
-
-and nothing has to enumerate 2^n labellings. A labelling may also be held fixed, which reaches the
-best line of *each* labelling, also of those the sum would drown.
+Given the axis, contacts are independent: the cost of a line is a sum over contacts, labels
+included (see `estimator.likelihood`), whatever their number.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from math import exp, log, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
-from estimator.contact import Miss
-from estimator.likelihood import Lines, Terms, evaluate
-from estimator.prior import (
-    AxisPrior,
-    LineTerms,
-    location_terms,
-    miss_terms,
-    offset_terms,
-    prior_terms,
+from estimator.compiled import V3, across, along, compiled, dot, scaled
+from estimator.likelihood import (
+    LOCAL,
+    add_constraints,
+    fill_derivatives,
+    fill_motions,
+    fit_of,
+    gross_errors,
+    seen_from,
+    vector,
 )
-from estimator.readings import Readings
-from estimator.vectors import Array, Index, Mask
+from estimator.linear import factor, solve_factored
+from estimator.problem import (
+    BASIS,
+    ORIGIN,
+    POINT,
+    PRECISION,
+    SIZE,
+    SPREAD,
+    Background,
+    Nuisances,
+)
+from estimator.readings import POSITION, VOID, Readings
+from estimator.vectors import Array
 
 LARGEST_TURN = 0.3  # of one step [rad]
+LARGEST_SHIFT = 1.5  # of one step, in spreads
+MISSED_ANYWAY = 0.2  # chance that a miss has another reason: an end, a dent, a slip
+CHART_STEP = 1e-6
 
 
-@dataclass(frozen=True, eq=False)
-class Posterior:
-    """Readings with everything else that bears on the line.
+class Work(NamedTuple):
+    """Space for derivatives of P parameters; made once, overwritten by every call."""
 
-    Args:
-        readings: Contacts as arrays.
-        origin: Reference point: the charts' origins are its feet [m], (3,).
-        spread: Length scale of the contacts [m]; without a prior the line is expected within
-            about twice this from them.
-        prior: What is believed of the axis, if anything.
-        misses: Where fingers met nothing.
-    """
-
-    readings: Readings
-    origin: Array
-    spread: float
-    prior: AxisPrior | None = None
-    misses: tuple[Miss, ...] = ()
-
-    def background(self, lines: Lines) -> LineTerms:
-        """Everything but the contacts."""
-        terms = offset_terms(self.readings.var_offset, lines)
-        if self.prior is None:
-            return terms + location_terms(self.origin, 2.0 * self.spread, lines)
-        terms = terms + prior_terms(self.prior, lines)
-        return terms + miss_terms(self.misses, self.prior.radius, self.prior.radius_sd, lines)
-
-    def at(self, lines: Lines, labels: Index | None = None) -> LineTerms:
-        """Cost, gradient and information; labels (S, n) fixed, or summed out where None."""
-        return self.background(lines) + over_contacts(evaluate(self.readings, lines), labels)
-
-    def take(self, index: Index) -> Posterior:
-        """The rows of batched readings that belong to some of the lines."""
-        return replace(self, readings=self.readings.take(index))
+    gradient: Array  # (P,)
+    fisher: Array  # (P, P), lower triangle
+    local_gradient: Array  # (9,)
+    local_fisher: Array  # (9, 9)
+    rows: Array  # (8, 9)
+    chart: Array  # (4, 4)
+    lifted: Array  # (P, P)
+    step: Array  # (P,)
+    right: Array  # (n,): probability that each contact is no gross error
 
 
-def over_contacts(terms: Terms, labels: Index | None) -> LineTerms:
-    """Sum contacts up under fixed labels, or with the labels summed out."""
-    if labels is None:
-        weights = label_weights(terms)
-        cost = -np.logaddexp(-terms.cost[..., 0], -terms.cost[..., 1])
-    else:
-        weights = np.eye(2)[labels.astype(int)]
-        cost = np.sum(weights * terms.cost, axis=-1)
-    return LineTerms(
-        cost.sum(axis=1) + terms.cost.shape[1] * np.log(2.0),
-        np.einsum("snl,snlp->sp", weights, terms.gradient),
-        np.einsum("snl,snlpq->spq", weights, terms.fisher),
+@compiled
+def work_space(parameters: int, contacts: int) -> Work:
+    return Work(
+        np.zeros(parameters),
+        np.zeros((parameters, parameters)),
+        np.zeros(LOCAL),
+        np.zeros((LOCAL, LOCAL)),
+        np.zeros((8, LOCAL)),
+        np.zeros((4, 4)),
+        np.zeros((parameters, parameters)),
+        np.zeros(parameters),
+        np.zeros(contacts),
     )
 
 
-def label_weights(terms: Terms) -> Array:
-    """Probability of each row being the parallel's, given the line, (S, n, 2)."""
-    odds = np.clip(terms.cost[..., 1] - terms.cost[..., 0], -500.0, 500.0)
-    first = 1.0 / (1.0 + np.exp(-odds))
-    return np.stack([first, 1.0 - first], axis=-1)
+@compiled
+def copied(x: Array, out: Array) -> None:
+    for k in range(len(x)):
+        out[k] = x[k]
 
 
+@compiled
+def shared(background: Background, s: int) -> int:
+    """Row of set s, or the one row that all sets share."""
+    return min(s, len(background.lines) - 1)
+
+
+@compiled
+def spread_of(background: Background, s: int) -> float:
+    spread: float = background.lines[shared(background, s), SPREAD]
+    return spread
+
+
+@compiled
+def line_of(x: Array) -> tuple[V3, V3]:
+    return (x[0], x[1], x[2]), (x[3], x[4], x[5])
+
+
+@compiled
+def states_of(nuisances: Nuisances, i: int, x: Array) -> tuple[float, float, V3]:
+    """delta, lambda and position bias of contact i."""
+    delta, scale, bias = 0.0, 0.0, (0.0, 0.0, 0.0)
+    slot = nuisances.slots[i]
+    if slot[0] >= 0:
+        delta = x[6 + slot[0]]
+    if slot[1] >= 0:
+        scale = x[6 + slot[1]]
+    if slot[2] >= 0:
+        k = 6 + slot[2]
+        bias = (x[k], x[k + 1], x[k + 2])
+    return delta, scale, bias
+
+
+@compiled
+def contacts_cost(
+    readings: Readings,
+    nuisances: Nuisances,
+    background: Background,
+    s: int,
+    x: Array,
+    derivatives: bool,
+    work: Work,
+) -> tuple[float, float, float]:
+    """Cost of all contacts of set s, sum and number of squared residuals; derivatives are added
+    to those in work.
+    """
+    a, u = line_of(x)
+    basis = across(u)
+    cost, chi_square, freedom = 0.0, 0.0, 0.0
+    locals_ = 4 if len(nuisances.precision) == 0 else LOCAL
+    for i in range(readings.shape[1]):
+        delta, scale, bias = states_of(nuisances, i, x)
+        row = readings[s, i]
+        seen = seen_from(row, a, u, bias, delta)
+        fit = fit_of(row, seen, scale)
+        density, trust, normal_only = fit.log_density, 1.0, 0.0
+        if background.gross > 0.0:
+            density, trust, normal_only = gross_errors(row, seen, fit, background.gross)
+        cost -= density
+        chi_square += (trust + normal_only) * fit.a**2 + trust * (fit.b**2 + fit.c**2)
+        freedom += normal_only + trust
+        freedom += trust * ((row[VOID] == 0.0) + (fit.F_K > 0.0))
+        work.right[i] = trust
+        if derivatives:
+            fill_motions(seen, basis[0], basis[1], work.rows)
+            fill_derivatives(
+                row, seen, fit, trust, normal_only,
+                work.local_gradient, work.local_fisher, work.rows, locals_,
+            )  # fmt: skip
+        cost += add_constraints(
+            row, seen, background.slope, derivatives,
+            work.local_gradient, work.local_fisher, work.rows, locals_,
+        )  # fmt: skip
+        if derivatives:
+            _scatter(nuisances, i, work, locals_)
+    return cost, chi_square, freedom
+
+
+@compiled
+def place(nuisances: Nuisances, i: int, j: int) -> int:
+    """Parameter of the whole problem that is parameter j of contact i; -1 for none."""
+    if j < 4:
+        return j
+    slot = nuisances.slots[i, min(j - 4, 2)]
+    if slot < 0:
+        return -1
+    first: int = slot
+    return 4 + first + max(j - 6, 0)
+
+
+@compiled
+def _scatter(nuisances: Nuisances, i: int, work: Work, locals_: int) -> None:
+    for j in range(locals_):
+        J = place(nuisances, i, j)
+        if J < 0:
+            continue
+        work.gradient[J] += work.local_gradient[j]
+        for k in range(j + 1):
+            K = place(nuisances, i, k)
+            if K >= 0:
+                work.fisher[max(J, K), min(J, K)] += work.local_fisher[j, k]
+
+
+@compiled
+def cost_at(
+    readings: Readings,
+    nuisances: Nuisances,
+    background: Background,
+    s: int,
+    x: Array,
+    derivatives: bool,
+    work: Work,
+) -> float:
+    """Negative log posterior of a line; with derivatives, work holds gradient and information."""
+    if derivatives:
+        for j in range(len(work.gradient)):
+            work.gradient[j] = 0.0
+            for k in range(j + 1):
+                work.fisher[j, k] = 0.0
+    cost, _, _ = contacts_cost(readings, nuisances, background, s, x, derivatives, work)
+    for k in range(len(nuisances.precision)):
+        cost += 0.5 * nuisances.precision[k] * x[6 + k] ** 2
+        if derivatives:
+            work.gradient[4 + k] += nuisances.precision[k] * x[6 + k]
+            work.fisher[4 + k, 4 + k] += nuisances.precision[k]
+    if background.informed:
+        cost += _prior_cost(background, s, x, derivatives, work)
+        cost += _size_cost(readings, background, s, x, derivatives, work)
+        return cost + _miss_cost(background, x, derivatives, work)
+    return cost + _location_cost(background, s, x, derivatives, work)
+
+
+@compiled
+def _location_cost(bg: Background, s: int, x: Array, derivatives: bool, work: Work) -> float:
+    """The line passes the contacts' centroid at a distance of about two spreads.
+
+    Lines hold the foot of the origin as their point, so tilt does not change it to first order.
+    """
+    a, u = line_of(x)
+    t = along(a, -1.0, vector(bg.lines[shared(bg, s)], ORIGIN))
+    weight = 1.0 / (2.0 * spread_of(bg, s)) ** 2
+    if derivatives:
+        E1, E2 = across(u)
+        work.gradient[0] += weight * dot(t, E1)
+        work.gradient[1] += weight * dot(t, E2)
+        work.fisher[0, 0] += weight
+        work.fisher[1, 1] += weight
+    return 0.5 * weight * dot(t, t)
+
+
+@compiled
+def chart_at(point: V3, basis: tuple[V3, V3, V3], a: V3, u: V3) -> tuple[float, ...]:
+    """(t1, t2, w1, w2) of a line in the chart at (point, basis[2]): see `estimator.axis`."""
+    if dot(u, basis[2]) < 0.0:
+        u = scaled(-1.0, u)
+    s1, s2, c = dot(u, basis[0]), dot(u, basis[1]), dot(u, basis[2])
+    norm = sqrt(s1 * s1 + s2 * s2)
+    angle = np.arctan2(norm, c)
+    d1, d2 = (s1 / norm, s2 / norm) if norm > 0.0 else (0.0, 0.0)
+    gap = along(a, -1.0, point)
+    foot = along(gap, -dot(gap, u), u)
+    # the basis carried along the rotation from basis[2] to u
+    towards = along(scaled(d1, basis[0]), d2, basis[1])
+    turned = along(scaled(c - 1.0, towards), -norm, basis[2])
+    t1 = dot(foot, along(basis[0], d1, turned))
+    t2 = dot(foot, along(basis[1], d2, turned))
+    return t1, t2, d1 * angle, d2 * angle
+
+
+@compiled
+def _prior_frame(bg: Background, s: int) -> tuple[V3, tuple[V3, V3, V3]]:
+    row = bg.lines[shared(bg, s)]
+    basis = (vector(row, BASIS), vector(row, BASIS + 3), vector(row, BASIS + 6))
+    return vector(row, POINT), basis
+
+
+@compiled
+def _nudged(a: V3, u: V3, basis: tuple[V3, V3], j: int, h: float) -> tuple[V3, V3]:
+    if j < 2:
+        return along(a, h, basis[j]), u
+    v = along(u, h, basis[j - 2])
+    return a, scaled(1.0 / sqrt(dot(v, v)), v)
+
+
+@compiled
+def _prior_cost(bg: Background, s: int, x: Array, derivatives: bool, work: Work) -> float:
+    """Gaussian in the prior's chart; the Jacobian between charts by central differences."""
+    point, frame = _prior_frame(bg, s)
+    a, u = line_of(x)
+    here = chart_at(point, frame, a, u)
+    row = bg.lines[shared(bg, s)]
+    y = np.zeros(4)
+    for j in range(4):
+        for k in range(4):
+            y[j] += row[PRECISION + 4 * j + k] * here[k]
+    if derivatives:
+        basis = across(u)
+        for j in range(4):
+            h = CHART_STEP * (spread_of(bg, s) if j < 2 else 1.0)
+            a1, u1 = _nudged(a, u, basis, j, h)
+            a2, u2 = _nudged(a, u, basis, j, -h)
+            ahead, behind = chart_at(point, frame, a1, u1), chart_at(point, frame, a2, u2)
+            for k in range(4):
+                work.chart[k, j] = (ahead[k] - behind[k]) / (2.0 * h)
+        for j in range(4):
+            for k in range(4):
+                work.gradient[j] += work.chart[k, j] * y[k]
+                for m in range(4):
+                    for i in range(j + 1):
+                        P_km = row[PRECISION + 4 * k + m]
+                        work.fisher[j, i] += work.chart[k, j] * P_km * work.chart[m, i]
+    return 0.5 * (here[0] * y[0] + here[1] * y[1] + here[2] * y[2] + here[3] * y[3])
+
+
+@compiled
+def _size_cost(
+    readings: Readings, bg: Background, s: int, x: Array, derivatives: bool, work: Work
+) -> float:
+    """Radius of each contact against the believed size; n contacts weigh as much as one."""
+    a, u = line_of(x)
+    E1, E2 = across(u)
+    mean, weight = bg.lines[shared(bg, s), SIZE], bg.lines[shared(bg, s), SIZE + 1]
+    cost = 0.0
+    for i in range(readings.shape[1]):
+        q = along(vector(readings[s, i], POSITION), -1.0, a)
+        cost += 0.5 * weight * _pull(q, u, E1, E2, mean, weight, derivatives, work)
+    return cost
+
+
+@compiled
+def _pull(
+    q: V3, u: V3, E1: V3, E2: V3, mean: float, weight: float, derivatives: bool, work: Work
+) -> float:
+    """Squared difference of the distance of q from the line and `mean`; derivatives weighted."""
+    z = dot(q, u)
+    away = along(q, -z, u)
+    r = max(sqrt(dot(away, away)), 1e-300)
+    if derivatives:
+        d1, d2 = -dot(E1, away) / r, -dot(E2, away) / r
+        slope = (d1, d2, z * d1, z * d2)
+        for j in range(4):
+            work.gradient[j] += weight * (r - mean) * slope[j]
+            for k in range(j + 1):
+                work.fisher[j, k] += weight * slope[j] * slope[k]
+    squared: float = (r - mean) ** 2
+    return squared
+
+
+@compiled
+def _miss_cost(bg: Background, x: Array, derivatives: bool, work: Work) -> float:
+    """Where a finger met nothing the line is farther away than radius plus pad, softly.
+
+    A miss may have other reasons, so it never costs more than -log MISSED_ANYWAY; several misses
+    share their reason and together weigh as one.
+    """
+    a, u = line_of(x)
+    E1, E2 = across(u)
+    cost, count = 0.0, len(bg.misses)
+    for i in range(count):
+        q = along(vector(bg.misses[i], 0), -1.0, a)
+        away = along(q, -dot(q, u), u)
+        kept, sd = bg.misses[i, 3], bg.misses[i, 4]
+        short = max(kept - sqrt(dot(away, away)), 0.0) / sd
+        told = (1.0 - MISSED_ANYWAY) * exp(-0.5 * short**2)
+        cost -= log(MISSED_ANYWAY + told) / count
+        if short > 0.0:
+            weight = told / (MISSED_ANYWAY + told) / count / sd**2
+            _pull(q, u, E1, E2, kept, weight, derivatives, work)
+    return cost
+
+
+@compiled
+def move(background: Background, s: int, x: Array, step: Array, out: Array) -> None:
+    """The state after a step in the chart at its own line; the point returns to the foot."""
+    a, u = line_of(x)
+    E1, E2 = across(u)
+    v = along(along(u, step[2], E1), step[3], E2)
+    u = scaled(1.0 / sqrt(dot(v, v)), v)
+    a = along(along(a, step[0], E1), step[1], E2)
+    gap = along(vector(background.lines[shared(background, s)], ORIGIN), -1.0, a)
+    a = along(a, dot(gap, u), u)
+    out[0], out[1], out[2] = a
+    out[3], out[4], out[5] = u
+    for k in range(6, len(x)):
+        out[k] = x[k] + step[k - 2]
+
+
+@compiled
+def solve_lifted(work: Work, damping: float, spread: float) -> None:
+    """work.step = -(F + damping (diag F + 1))^-1 gradient, lengths of the line in spreads."""
+    P = len(work.gradient)
+    L, y = work.lifted, work.step
+    for j in range(P):
+        uj = spread if j < 2 else 1.0
+        for k in range(j + 1):
+            L[j, k] = work.fisher[j, k] * uj * (spread if k < 2 else 1.0)
+        L[j, j] += damping * (L[j, j] + 1.0) + 1e-12
+        y[j] = -work.gradient[j] * uj
+    factor(L, L)
+    solve_factored(L, y)
+    longest = max(abs(y[0]), abs(y[1])) / LARGEST_SHIFT
+    longest = max(longest, max(abs(y[2]), abs(y[3])) / LARGEST_TURN, 1.0)
+    for j in range(P):
+        y[j] *= (spread if j < 2 else 1.0) / longest
+
+
+@compiled
 def climb(
-    posterior: Posterior,
-    start: Lines,
-    labels: Index | None = None,
-    *,
-    iterations: int = 40,
-    gain_at_rest: float = 1e-7,
-) -> tuple[Lines, LineTerms]:
-    """Fisher scoring with Levenberg's damping, all starts at once.
+    readings: Readings,
+    nuisances: Nuisances,
+    background: Background,
+    s: int,
+    x: Array,
+    iterations: int,
+    gain_at_rest: float,
+    work: Work,
+) -> float:
+    """Fisher scoring with Levenberg's damping; x becomes the peak, work holds its derivatives.
 
     A step is taken only where the full cost (log determinants included) falls.
-
-    Returns:
-        Where each start ended (its point at the foot of the origin), and the terms there.
     """
-    origin = posterior.origin
-    lines = start.moved(np.zeros((len(start.a), 5)), origin)
-    terms = posterior.at(lines, labels)
-    damping = np.full(len(lines.a), 1e-3)
-    active = np.arange(len(lines.a))
+    trial = np.empty_like(x)
+    spread = spread_of(background, s)
+    cost = cost_at(readings, nuisances, background, s, x, True, work)
+    damping = 1e-3
     for _ in range(iterations):
-        step = _damped_step(terms, damping, active, posterior.spread)
-        trial = lines.take(active).moved(step, origin)
-        here = labels[active] if labels is not None else None
-        found = posterior.take(active).at(trial, here)
-        gain = terms.cost[active] - found.cost
-        better = gain > 0
-        lines = _replaced(lines, active[better], trial, better)
-        terms = _replaced_terms(terms, active[better], found, better)
-        damping[active] = np.where(better, 0.2, 8.0) * damping[active]
-        resting = (better & (gain < gain_at_rest)) | (damping[active] > 1e7)
-        active = active[~resting]
-        if len(active) == 0:
-            break
-        damping = np.maximum(damping, 1e-9)
-    return lines, terms
-
-
-def _damped_step(terms: LineTerms, damping: Array, active: Index, spread: float) -> Array:
-    units = np.array([spread, spread, 1.0, 1.0, 1.0])
-    fisher = terms.fisher[active] * units[:, None] * units
-    gradient = terms.gradient[active] * units
-    diagonal = np.einsum("spp->sp", fisher)
-    lifted = damping[active, None] * (diagonal + 1.0) + 1e-9
-    step = -np.linalg.solve(fisher + lifted[..., None] * np.eye(5), gradient[..., None])[..., 0]
-    longest = np.max(np.abs(step[:, :4]) / [1.5, 1.5, LARGEST_TURN, LARGEST_TURN], axis=1)
-    return np.asarray(step / np.maximum(longest, 1.0)[:, None] * units)
-
-
-def _replaced(lines: Lines, where: Index, trial: Lines, chosen: Mask) -> Lines:
-    a, u, delta = lines.a.copy(), lines.u.copy(), lines.delta.copy()
-    a[where], u[where], delta[where] = trial.a[chosen], trial.u[chosen], trial.delta[chosen]
-    return Lines(a, u, delta)
-
-
-def _replaced_terms(terms: LineTerms, where: Index, found: LineTerms, chosen: Mask) -> LineTerms:
-    cost, gradient, fisher = terms.cost.copy(), terms.gradient.copy(), terms.fisher.copy()
-    cost[where], gradient[where] = found.cost[chosen], found.gradient[chosen]
-    fisher[where] = found.fisher[chosen]
-    return LineTerms(cost, gradient, fisher)
+        solve_lifted(work, damping, spread)
+        move(background, s, x, work.step, trial)
+        found = cost_at(readings, nuisances, background, s, trial, False, work)
+        gain = cost - found
+        if gain > 0.0:
+            copied(trial, x)
+            cost = cost_at(readings, nuisances, background, s, x, True, work)
+            damping = max(0.2 * damping, 1e-9)
+            if gain < gain_at_rest:
+                break
+        else:
+            damping *= 8.0
+            if damping > 1e7 or gain > -1e-13:
+                break
+    return cost

@@ -1,118 +1,132 @@
-"""Contacts as arrays with variances: what the likelihood reads.
+"""Contacts as arrays with their noise: what the likelihood reads.
 
-The noise sits on the curvature tensor. A direction is therefore known to deviator / |k1 - k2|, and
-where the two curvatures are equal within noise it is void. A tensor of equal curvatures *looks*
-unequal by its noise, half the difference Rayleigh distributed; so contacts of a few sd are also
-judged together: eight touches of a sphere must not pass because one of them is lucky.
+The noise sits on the curvature tensor, and so does the likelihood, which needs no special case for
+directions that are poorly known. Only where both curvatures are equal within the noise (umbilic)
+a tensor *looks* unequal by its noise, half the difference Rayleigh distributed, and would pretend
+a direction: there the difference is set to zero. Contacts of a few sd are also judged together:
+eight touches of a sphere must not pass because one of them is lucky.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
+from estimator.batches import ContactSets
 from estimator.contact import Contact, SensorNoise
 from estimator.surface import Geometry
-from estimator.vectors import Array, Index, Mask
+from estimator.vectors import Array, Mask, cross
 
 UMBILIC = 3.0  # half difference of curvatures in its own sd, below which directions are void
 DOUBTFUL = 5.0  # ... below which contacts are also judged together
 LUCK = 1e-4  # chance that umbilics together look otherwise
-VOID_DIRECTION = 1e3  # sd [rad] that says nothing
-UNMEASURED = 1e6  # sd of a curvature that nobody measured [1/m]
+CONCAVE = 2.0  # sd by which both curvatures must be negative before a contact counts as concave
 
 
-@dataclass(frozen=True, eq=False)
-class Readings:
-    """Contacts as arrays with variances; a leading axis of length 1 or S."""
+# columns of a contact
+POSITION, NORMAL, K0, K1, KAPPA, CENSORED = 0, 3, 6, 9, 12, 14
+EDGE, CONVEX, VOID = 16, 17, 18
+SD_POSITION, SD_NORMAL, SD_DIRECTION, SD_K_TZ, SD_K_TT, SD_SHARE = 19, 20, 21, 22, 23, 24
+COLUMNS = 25
 
-    p: Array  # (., n, 3)
-    n: Array  # (., n, 3)
-    k: Array  # (., n, 2, 3)
-    kappa: Array  # (., n, 2)
-    var_p: Array  # (., n)
-    var_n: Array  # (., n)
-    var_psi: Array  # (., n)
-    var_kappa: Array  # (., n, 2)
-    var_offset: float
-    size: tuple[float, float] = (0.0, np.inf)  # mean and sd of the contacts' radius [m]
+Readings = Array
+"""S sets of n contacts as numbers, (S, n, COLUMNS):
 
-    def take(self, index: Index) -> Readings:
-        """Rows of the leading axis, one for each line; nothing to do where all lines share."""
-        if len(self.p) == 1:
-            return self
-        p, n, k, kappa = (x[index] for x in (self.p, self.n, self.k, self.kappa))
-        noise = (self.var_p, self.var_n, self.var_psi, self.var_kappa)
-        var_p, var_n, var_psi, var_kappa = (x[index] for x in noise)
-        return Readings(
-            p, n, k, kappa, var_p, var_n, var_psi, var_kappa, self.var_offset, self.size
-        )
+    position [m], normal, the two directions k0, k1 with k0 x k1 = n
+    KAPPA          curvatures along k0, k1 [1/m]: zero where saturated, equal where umbilic
+    CENSORED       whether a curvature was too flat to read, for each of the two
+    EDGE           curvature that counts as flat [1/m]; infinite where none was measured
+    CONVEX, VOID   whether the axis must lie behind the contact; whether directions say nothing
+    SD_...         of the position [m], the normal [rad], directions beyond the tensor's [rad],
+                   K_tz and K_tt [1/m], and the relative error of curvatures [-]
+"""
 
 
 def readings_of(contacts: Sequence[Contact]) -> Readings:
-    """Stack contacts, turning the noise of the curvature tensor into that of what is read."""
-    kappa = np.array([c.curvatures for c in contacts]).reshape(1, -1, 2)
-    readings = stacked_readings(
-        np.array([c.position for c in contacts]).reshape(1, -1, 3),
-        np.array([c.normal for c in contacts]).reshape(1, -1, 3),
-        np.array([c.directions for c in contacts]).reshape(1, -1, 2, 3),
-        kappa,
+    """One set of contacts; an empty one has shape (1, 0)."""
+    n = len(contacts)
+    return stacked_readings(
+        np.array([c.position for c in contacts]).reshape(1, n, 3),
+        np.array([c.normal for c in contacts]).reshape(1, n, 3),
+        np.array([c.directions for c in contacts]).reshape(1, n, 2, 3),
+        np.array([c.curvatures for c in contacts]).reshape(1, n, 2),
         [c.noise for c in contacts],
     )
-    void = _umbilic_together(np.array([c.umbilicity for c in contacts]))
-    return replace(readings, var_psi=np.where(void, VOID_DIRECTION**2, readings.var_psi))
+
+
+def readings_of_sets(sets: ContactSets) -> Readings:
+    """Many sets of contacts."""
+    noise = [sets.noise] * sets.positions.shape[1]
+    return stacked_readings(sets.positions, sets.normals, sets.directions, sets.curvatures, noise)
 
 
 def exact_readings(geometry: Geometry, noise: SensorNoise) -> Readings:
-    """Noise-free readings of places (B, n), row 0 the parallel's: what a planner expects."""
+    """Noise-free readings of places (S, n), row 0 the parallel's: what a planner expects."""
     return stacked_readings(
         geometry.p,
         geometry.n,
         np.stack([geometry.k_theta, geometry.k_z], axis=-2),
         np.stack([geometry.kappa_theta, geometry.kappa_z], axis=-1),
         [noise] * geometry.p.shape[1],
+        together=False,
     )
 
 
 def stacked_readings(
-    p: Array, n: Array, k: Array, kappa_read: Array, noise: Sequence[SensorNoise]
+    p: Array,
+    n: Array,
+    k: Array,
+    kappa_read: Array,
+    noise: Sequence[SensorNoise],
+    *,
+    together: bool = True,
 ) -> Readings:
-    """Readings from arrays (., n, ...) with NaN where a curvature saturated."""
+    """Readings from arrays (S, n, ...) with NaN where a curvature saturated.
 
-    def column(name: str) -> Array:
-        return np.array([getattr(s, name) for s in noise], dtype=np.float64)
-
-    saturated = np.isnan(kappa_read)
-    kappa = np.where(saturated, 0.0, kappa_read)
-    deviator, flat = column("deviator"), column("flat")
+    Args:
+        together: Whether contacts of doubtful direction are also judged together.
+    """
+    table = np.array([_sds(s) for s in noise], dtype=np.float64).reshape(len(noise), 7)
+    edge = np.broadcast_to(table[:, 6], kappa_read.shape[:2])
+    unmeasured = np.isinf(edge)
+    censored = np.isnan(kappa_read)
+    kappa = np.where(censored, 0.0, kappa_read)
+    kappa = np.where(unmeasured[..., None], [0.5, -0.5], kappa)  # so that K_tz = -sin(2 theta)/2
+    sd = np.array(np.broadcast_to(table[:, :6], (*edge.shape, 6)))
+    sd[..., 3] = np.where(unmeasured, 0.0, sd[..., 3])
+    sd[..., 2] = np.where(unmeasured, np.maximum(sd[..., 2], 1e-9), sd[..., 2])
     half = 0.5 * np.abs(kappa[..., 0] - kappa[..., 1])
-    excess = np.sqrt(np.maximum(half**2 - 2.0 * deviator**2, 0.0))  # noise alone widens half
-    turn = np.hypot(deviator / np.maximum(2.0 * excess, 1e-12), column("direction"))
-    psi = np.where(half <= UMBILIC * deviator, VOID_DIRECTION, np.maximum(turn, 1e-9))
-    psi = np.where(np.isinf(flat), column("direction"), psi)
-    even = (column("mean_curvature") ** 2 + deviator**2)[:, None]
-    var_kappa = even + (column("curvature_scale")[:, None] * kappa) ** 2
-    flat = np.minimum(flat, UNMEASURED)[:, None]
-    whole = np.ones_like(half)
-    return Readings(
-        p=p,
-        n=n,
-        k=k,
-        kappa=kappa,
-        var_p=whole * column("position") ** 2,
-        var_n=whole * column("normal") ** 2,
-        var_psi=psi**2,
-        var_kappa=np.where(saturated, flat**2, var_kappa),
-        var_offset=max((s.direction_offset for s in noise), default=0.0) ** 2,
-    )
+    umbilicity = np.divide(half, sd[..., 3], out=np.full(half.shape, np.inf), where=sd[..., 3] > 0)
+    umbilicity = np.where(half == 0.0, 0.0, umbilicity)
+    void = umbilicity <= UMBILIC
+    if together:
+        void |= _umbilic_together(umbilicity)
+    kappa = np.where(void[..., None], kappa.mean(axis=-1, keepdims=True), kappa)
+    read = np.nan_to_num(kappa_read, nan=0.0)
+    out = np.empty((*half.shape, COLUMNS))
+    out[..., POSITION:NORMAL], out[..., NORMAL:K0] = p, n
+    out[..., K0:K1], out[..., K1:KAPPA] = k[..., 0, :], cross(n, k[..., 0, :])
+    out[..., KAPPA:CENSORED], out[..., CENSORED:EDGE] = kappa, censored
+    out[..., EDGE], out[..., VOID] = edge, void
+    out[..., CONVEX] = unmeasured | (read.max(axis=-1) > -CONCAVE * sd[..., 4])
+    out[..., SD_POSITION:COLUMNS] = sd
+    return out
+
+
+def _sds(noise: SensorNoise) -> tuple[float, ...]:
+    even = max(float(np.hypot(noise.mean_curvature, noise.deviator)), 1e-9)
+    tensor = max(noise.deviator, 1e-9)
+    return (
+        noise.position, noise.normal, noise.direction, tensor, even, noise.curvature_scale,
+        noise.flat,
+    )  # fmt: skip
 
 
 def _umbilic_together(umbilicity: Array) -> Mask:
     """Contacts of doubtful direction that all may be umbilic: (half / sd)^2 is chi-square of 2."""
     doubtful = umbilicity < DOUBTFUL
-    total = float(np.sum(umbilicity[doubtful] ** 2))
-    luck = chi2.sf(total, 2 * max(int(doubtful.sum()), 1))
-    return np.asarray(doubtful & (luck > LUCK))
+    total = np.sum(np.where(doubtful, umbilicity, 0.0) ** 2, axis=1)
+    luck = chdtrc(2.0 * np.maximum(doubtful.sum(axis=1), 1), total)
+    return np.asarray(doubtful & (luck > LUCK)[:, None])

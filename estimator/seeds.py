@@ -1,112 +1,178 @@
-"""Where to start the climb: lines that two contacts already fix, and a few that none does."""
+"""Where to start the climb: lines that two contacts already fix, and a few that none does.
+
+Everything is built from the data alone, so a rigid motion moves the seeds along.
+"""
 
 from __future__ import annotations
 
-from itertools import combinations, product
+from math import sqrt
 
 import numpy as np
 
-from estimator.likelihood import Lines, evaluate
-from estimator.posterior import label_weights
-from estimator.prior import AxisPrior
-from estimator.readings import Readings
-from estimator.vectors import Array, Index, cross, unit
+from estimator.compiled import V3, along, compiled, cross3, dot, scaled
+from estimator.likelihood import vector
+from estimator.linear import factor, solve_factored
+from estimator.posterior import shared, spread_of
+from estimator.problem import BASIS, ORIGIN, POINT, Background
+from estimator.readings import K0, K1, NORMAL, POSITION, VOID, Readings
+from estimator.vectors import Array, cross
 
-ENUMERATED = 4  # up to this many contacts every labelling gets starts of its own
 MOST_PAIRS = 45
+FAN = 4  # contacts whose directions are tried as the axis' own
+NEARLY_PARALLEL = 0.03  # sine of two planes' angle below which they give no line
+COMPLEX = 5  # normals from which a linear complex is fitted
 
 
-def seeds(
-    readings: Readings, origin: Array, spread: float, prior: AxisPrior | None
-) -> tuple[Lines, Index | None]:
-    """Starts, and their fixed labels for few contacts (None: labels summed out).
+@compiled
+def most_seeds(n: int) -> int:
+    fan = min(n, FAN)
+    return 4 * min(n * (n - 1) // 2, MOST_PAIRS) + 2 * fan + fan * (fan - 1) // 2 + 5
+
+
+@compiled
+def seed_lines(
+    readings: Readings, background: Background, extra: Array, s: int, seeds: Array
+) -> int:
+    """Fill seeds (M, 6) with points and unit directions; returns how many.
+
+    Two meridian planes meet in the axis, eq. (31): every pair of contacts under its four
+    labellings. The rest starts where planes are parallel or directions void.
+    """
+    count = _pair_lines(readings, background, s, seeds)
+    if background.informed:
+        row = background.lines[shared(background, s)]
+        _put(seeds, count, vector(row, POINT), vector(row, BASIS + 6))
+        count += 1
+    n = readings.shape[1]
+    if n == 0:
+        return count
+    for k in range(extra.shape[1]):
+        _put(seeds, count, vector(extra[s, k], 0), vector(extra[s, k], 3))
+        count += 1
+    return _fan(readings, background, s, seeds, count)
+
+
+@compiled
+def _pair_lines(readings: Readings, background: Background, s: int, seeds: Array) -> int:
+    n = readings.shape[1]
+    origin = vector(background.lines[shared(background, s)], ORIGIN)
+    total = n * (n - 1) // 2
+    stride = max(1.0, (total - 1) / (MOST_PAIRS - 1))
+    count, seen, wanted = 0, 0, 0.0
+    for i in range(n):
+        for j in range(i + 1, n):
+            chosen = seen >= wanted - 1e-9
+            seen += 1
+            if not chosen:
+                continue
+            wanted += stride
+            if readings[s, i, VOID] > 0.0 or readings[s, j, VOID] > 0.0:
+                continue
+            for first in range(2):
+                for second in range(2):
+                    if _meet(readings, s, i, j, first, second, origin, seeds, count):
+                        count += 1
+    return count
+
+
+@compiled
+def _meet(
+    readings: Readings,
+    s: int,
+    i: int,
+    j: int,
+    first: int,
+    second: int,
+    origin: V3,
+    seeds: Array,
+    count: int,
+) -> bool:
+    """Where plane (k_first of i) meets plane (k_second of j), nearest to the origin."""
+    N1 = vector(readings[s, i], K0) if first == 0 else vector(readings[s, i], K1)
+    N2 = vector(readings[s, j], K0) if second == 0 else vector(readings[s, j], K1)
+    u = cross3(N1, N2)
+    square = dot(u, u)
+    if square < NEARLY_PARALLEL**2:
+        return False
+    d1 = dot(N1, along(vector(readings[s, i], POSITION), -1.0, origin))
+    d2 = dot(N2, along(vector(readings[s, j], POSITION), -1.0, origin))
+    point = along(scaled(d1, cross3(N2, u)), d2, cross3(u, N1))
+    point = along(origin, 1.0 / square, point)
+    u = scaled(1.0 / sqrt(square), u)
+    _put(seeds, count, point, u)
+    return True
+
+
+@compiled
+def _fan(readings: Readings, background: Background, s: int, seeds: Array, count: int) -> int:
+    """Through the point the normals pass nearest: measured directions, and normals' products."""
+    n = readings.shape[1]
+    point = _meeting_point(readings, background, s)
+    fan = min(n, FAN)
+    for i in range(fan):
+        _put(seeds, count, point, vector(readings[s, i], K0))
+        _put(seeds, count + 1, point, vector(readings[s, i], K1))
+        count += 2
+        for j in range(i):
+            u = cross3(vector(readings[s, i], NORMAL), vector(readings[s, j], NORMAL))
+            square = dot(u, u)
+            if square > NEARLY_PARALLEL**2:
+                _put(seeds, count, point, scaled(1.0 / sqrt(square), u))
+                count += 1
+    return count
+
+
+@compiled
+def _put(seeds: Array, k: int, point: V3, u: V3) -> None:
+    seeds[k, 0], seeds[k, 1], seeds[k, 2] = point
+    seeds[k, 3], seeds[k, 4], seeds[k, 5] = u
+
+
+@compiled
+def _meeting_point(readings: Readings, background: Background, s: int) -> V3:
+    """The point that the normals' lines pass nearest; where parallel, near the contacts."""
+    n = readings.shape[1]
+    origin = vector(background.lines[shared(background, s)], ORIGIN)
+    spread = spread_of(background, s)
+    across, pulled = np.zeros((3, 3)), np.zeros(3)
+    for j in range(3):
+        across[j, j] = n + 1e-3  # the pull keeps the point near the contacts
+    for i in range(n):
+        normal = vector(readings[s, i], NORMAL)
+        gap = along(vector(readings[s, i], POSITION), -1.0, origin)
+        side = along(gap, -dot(normal, gap), normal)
+        for j in range(3):
+            pulled[j] += side[j]
+            for k in range(j + 1):
+                across[j, k] -= normal[j] * normal[k]
+    factor(across, across)
+    solve_factored(across, pulled)
+    point = (pulled[0], pulled[1], pulled[2])
+    length = sqrt(dot(point, point))
+    return along(origin, min(1.0, 2.0 * spread / max(length, 1e-300)), point)
+
+
+def complex_lines(readings: Readings) -> Array:
+    """Axis of the linear complex nearest to the normals' lines (Pottmann and Randrup 1998).
+
+    Lines (n, p x n) that all meet the axis (g, g') satisfy g . (p x n) + g' . n = 0; the sum of
+    squares is least, under |g| = 1, at the smallest eigenvector of A - B C^-1 B^T.
 
     Returns:
-        Lines (S,), labels (S, n) or None.
+        Points and unit directions (S, 1, 6), from five contacts up; else (S, 0, 6).
     """
-    n = readings.p.shape[1]
-    general = _general_lines(readings, origin, spread, prior)
-    if n > ENUMERATED:
-        pairs, _ = _pair_lines(readings, origin, list(_spread_pairs(n)))
-        return _joined(pairs, general), None
-    weights = label_weights(evaluate(readings, general))
-    likeliest = np.argmax(weights, axis=-1).astype(np.intp)
-    if n < 2:
-        return general, likeliest
-    pairs, pair_labels = _pair_lines(readings, origin, list(combinations(range(n), 2)))
-    lines, labels = _completed(pairs, pair_labels, n)
-    return _joined(lines, general), np.vstack([labels, likeliest])
-
-
-def _pair_lines(
-    readings: Readings, origin: Array, pairs: list[tuple[int, int]]
-) -> tuple[Lines, Index]:
-    """Intersections of two meridian planes under the four labellings of a pair, eq. (31).
-
-    Returns:
-        Lines, and for each the labels (S, n) with -1 where the pair says nothing.
-    """
-    i, j = np.array(pairs).T
-    first, second = (x.ravel() for x in np.meshgrid([0, 1], [0, 1]))
-    i, j = np.repeat(i, 4), np.repeat(j, 4)
-    first, second = np.tile(first, len(pairs)), np.tile(second, len(pairs))
-    N1, N2 = readings.k[0, i, first], readings.k[0, j, second]
-    d1 = np.sum(N1 * (readings.p[0, i] - origin), axis=1)
-    d2 = np.sum(N2 * (readings.p[0, j] - origin), axis=1)
-    line = cross(N1, N2)
-    sine = np.linalg.norm(line, axis=1)
-    kept = sine > 0.03  # nearly the same plane: no line, the general starts take over
-    system = np.stack([N1, N2, line], axis=1)[kept]
-    rhs = np.stack([d1, d2, np.zeros_like(d1)], axis=1)[kept]
-    a = np.linalg.solve(system, rhs[..., None])[..., 0] + origin
-    labels = np.full((len(i), readings.p.shape[1]), -1, dtype=np.intp)
-    rows = np.arange(len(i))
-    labels[rows, i], labels[rows, j] = first, second
-    return Lines(a, unit(line[kept]), np.zeros(int(kept.sum()))), labels[kept]
-
-
-def _completed(lines: Lines, labels: Index, n: int) -> tuple[Lines, Index]:
-    """Each line once for every way to label the contacts its pair left open."""
-    open_ways = np.array(list(product((0, 1), repeat=n - 2)), dtype=np.intp)
-    repeated = np.repeat(np.arange(len(lines.a)), len(open_ways))
-    full = labels[repeated].copy()
-    full[full < 0] = np.tile(open_ways, (len(lines.a), 1)).ravel()
-    return lines.take(repeated), full
-
-
-def _general_lines(
-    readings: Readings, origin: Array, spread: float, prior: AxisPrior | None
-) -> Lines:
-    """The prior's axis, and a fan of directions through the point the normals pass nearest."""
-    n = readings.n[0]
-    across = np.eye(3) - n[:, :, None] * n[:, None, :]
-    pull = 1e-3 * np.eye(3)  # keeps the point near the contacts where normals are parallel
-    point = np.linalg.solve(
-        across.sum(axis=0) + pull,
-        np.einsum("nij,nj->i", across, readings.p[0] - origin),
-    )
-    length = float(np.linalg.norm(point))
-    point = origin + point * min(1.0, 2.0 * spread / max(length, 1e-12))
-    fan = unit(np.array([v for v in product((-1, 0, 1), repeat=3) if v > (0, 0, 0)], dtype=float))
-    # nudged: symmetric grasps make some of these exactly stationary
-    fan = unit(fan + 0.05 * fan[::-1])
-    a, u = np.repeat(point[None], len(fan), axis=0), fan
-    if prior is not None:
-        a = np.vstack([prior.axis.point, a])
-        u = np.vstack([prior.axis.direction, u])
-    return Lines(a, u, np.zeros(len(a)))
-
-
-def _spread_pairs(n: int) -> list[tuple[int, int]]:
-    """At most MOST_PAIRS pairs, evenly taken from all."""
-    pairs = list(combinations(range(n), 2))
-    chosen = np.unique(np.linspace(0, len(pairs) - 1, min(MOST_PAIRS, len(pairs))).astype(int))
-    return [pairs[i] for i in chosen]
-
-
-def _joined(first: Lines, second: Lines) -> Lines:
-    return Lines(
-        np.vstack([first.a, second.a]),
-        np.vstack([first.u, second.u]),
-        np.concatenate([first.delta, second.delta]),
-    )
+    S, n = readings.shape[:2]
+    if n < COMPLEX:
+        return np.empty((S, 0, 6))
+    p, normals = readings[..., POSITION:NORMAL], readings[..., NORMAL:K0]
+    centre = p.mean(axis=1)
+    q = p - centre[:, None]
+    scale = np.sqrt(np.mean(np.sum(q**2, axis=-1), axis=1))[:, None, None] + 1e-300
+    rows = np.concatenate([cross(q / scale, normals), normals], axis=-1)
+    M = np.swapaxes(rows, 1, 2) @ rows + 1e-9 * n * np.eye(6)
+    A, B, C = M[:, :3, :3], M[:, :3, 3:], M[:, 3:, 3:]
+    BT = np.swapaxes(B, 1, 2)
+    g = np.linalg.eigh(A - B @ np.linalg.solve(C, BT))[1][:, :, 0]
+    moment = -np.linalg.solve(C, BT @ g[:, :, None])[..., 0]
+    points = centre + scale[:, 0] * cross(g, moment)
+    return np.concatenate([points, g], axis=1)[:, None]
