@@ -4,6 +4,9 @@ Studies
     honesty     NEES, coverage, labels over families x sensors x 3, 4, 6, 10 contacts
     efficiency  root mean square error over the Cramer-Rao bound
     bias        a millimetre on each fingertip, modelled and not
+    degenerate  touches that leave the axis open, and false alarms on well-placed ones
+    scan        touches of a scanned product (--objects), whose directions err with heavy tails
+    fuzz        anything a contact may hold: no NaN, no exception, no long run
 
 Every figure comes with its count and its 95 % interval (Wilson for shares, bootstrap else).
 Objects are cylinder, cone, barrel, vase, torus section and the paper's lathe object, radius 15 to
@@ -26,12 +29,16 @@ from pathlib import Path
 
 import numpy as np
 import tyro
+from degenerate import degenerate_study
+from fuzz import fuzz_study
 from honesty import Interval, Share
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table as RichTable
-from studies import Cell, Table, Workload, bias_study, efficiency_study, honesty_study
+from scan import load_scan, scan_study
+from studies import bias_study, efficiency_study, honesty_study
+from workload import Cell, Table, Workload
 
 from estimator.fusion import estimate_axes
 from estimator.sensors import SENSORS
@@ -41,6 +48,9 @@ STUDIES: dict[str, tuple[Callable[[Workload], list[Table]], int]] = {
     "honesty": (honesty_study, 16800),
     "efficiency": (efficiency_study, 16800),
     "bias": (bias_study, 16800),
+    "degenerate": (degenerate_study, 16800),
+    "scan": (scan_study, 16800),
+    "fuzz": (fuzz_study, 100000),
 }
 
 
@@ -58,6 +68,8 @@ class Options:
     """Sensor classes."""
     structured: bool = False
     """Honesty: let readings err as real sensors of the class do, not as the estimator is told."""
+    objects: Path | None = None
+    """Folder of scanned objects (JSON); without it the study of a scan is left out."""
     out: Path | None = None
     """Write the tables into this file, as JSON."""
 
@@ -72,6 +84,9 @@ def main() -> int:
     console = Console(width=max(Console().width, WIDTH))
     tables = []
     for name in options.only:
+        if name == "scan" and options.objects is None:
+            console.print("scan: left out, --objects names no folder of scanned objects")
+            continue
         for table in _run(name, options, console):
             tables.append(table)
             console.print(_printed(table))
@@ -95,6 +110,8 @@ def _require_sane(options: Options) -> None:
         raise ValueError(f"--count: expected at least one run, got {options.count}")
     if options.seed < 0:
         raise ValueError(f"--seed: expected a number >= 0, got {options.seed}")
+    if options.objects is not None and "scan" in options.only:
+        load_scan(options.objects)
     if options.out is not None and not options.out.absolute().parent.is_dir():
         raise ValueError(f"--out {options.out}: there is no such folder")
 
@@ -111,6 +128,7 @@ def _run(name: str, options: Options, console: Console) -> list[Table]:
             options.seed,
             options.sensors,
             options.structured,
+            options.objects,
             lambda runs: progress.advance(task, runs),
         )
         return study(work)
@@ -126,7 +144,9 @@ def _printed(table: Table) -> RichTable:
 
 
 def _in_words(cell: Cell) -> str:
-    """Intervals stand below their figure; shares in per cent."""
+    """Intervals stand below their figure; shares in per cent; a dash where nothing was counted."""
+    if isinstance(cell, Interval) and not np.isfinite(cell.value):
+        return "-"
     if isinstance(cell, Share):
         return f"{100 * cell.value:.1f} %\n{100 * cell.low:.1f}-{100 * cell.high:.1f}"
     if isinstance(cell, Interval):

@@ -80,7 +80,8 @@ def draw_scenes(
     shapes = draw_shapes(family, count, rng=rng)
     place = _random_places if placement == "random" else _well_placed
     theta, height = place(count, contacts, rng)
-    return posed(shapes, theta, height * shapes.half_height * shapes.radius, rng=rng)
+    geometry = upright(shapes, theta, height * shapes.half_height * shapes.radius)
+    return posed(geometry, shapes.radius[:, 0], rng=rng)
 
 
 def draw_shapes(family: str, count: int, *, rng: np.random.Generator) -> Shapes:
@@ -99,21 +100,26 @@ def draw_shapes(family: str, count: int, *, rng: np.random.Generator) -> Shapes:
     return Shapes(curve, uniform(*RADII), half_height)
 
 
-def posed(shapes: Shapes, theta: Array, z: Array, *, rng: np.random.Generator) -> Scenes:
-    """Places (B, n) of B objects, each in a random pose."""
-    upright = SurfaceOfRevolution(Axis([0.0, 0.0, 0.0], [0.0, 0.0, 1.0]), shapes).at(theta, z)
-    points = REACH * rng.standard_normal((len(theta), 3))
-    directions = unit(rng.standard_normal((len(theta), 3)))
+def upright(shapes: Shapes, theta: Array, z: Array) -> Geometry:
+    """Places (B, n) of B objects that all have the world's z axis as their own."""
+    return SurfaceOfRevolution(Axis([0.0, 0.0, 0.0], [0.0, 0.0, 1.0]), shapes).at(theta, z)
+
+
+def posed(geometry: Geometry, radii: Array, *, rng: np.random.Generator) -> Scenes:
+    """Upright objects, each in a random pose."""
+    count = len(radii)
+    points = REACH * rng.standard_normal((count, 3))
+    directions = unit(rng.standard_normal((count, 3)))
     R = np.concatenate([basis_across(directions), directions[:, None]], axis=1)  # rows x, y, z
-    geometry = Geometry(
-        p=points[:, None] + upright.p @ R,
-        n=upright.n @ R,
-        k_theta=upright.k_theta @ R,
-        k_z=upright.k_z @ R,
-        kappa_theta=upright.kappa_theta,
-        kappa_z=upright.kappa_z,
+    moved = Geometry(
+        p=points[:, None] + geometry.p @ R,
+        n=geometry.n @ R,
+        k_theta=geometry.k_theta @ R,
+        k_z=geometry.k_z @ R,
+        kappa_theta=geometry.kappa_theta,
+        kappa_z=geometry.kappa_z,
     )
-    return Scenes(geometry, points, directions, shapes.radius[:, 0])
+    return Scenes(moved, points, directions, radii)
 
 
 def _random_places(count: int, contacts: int, rng: np.random.Generator) -> tuple[Array, Array]:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 from honesty import (
-    Interval,
     Runs,
     calibration,
     charted,
@@ -22,50 +20,16 @@ from honesty import (
     wrong,
 )
 from scenarios import FAMILIES, Scenes, draw_scenes
+from workload import Row, Table, Workload
 
-from estimator.batches import VERDICTS, AxisEstimates, ContactSets
+from estimator.batches import VERDICTS, AxisEstimates
 from estimator.contact import SensorNoise
 from estimator.sensors import SENSORS
 from sim_sensor.batch_noise import read_sets
 from sim_sensor.noise import SimulatedSensor, simulated_sensor
 
-Estimator = Callable[[ContactSets], AxisEstimates]
-Cell = float | int | str | Interval
-Row = dict[str, Cell]
-Progress = Callable[[int], None]  # called with the number of runs just finished
-
-BATCH = 2000  # runs estimated at a time
 BIAS = 1e-3  # sd of each coordinate of a finger's shift [m]
 FINGERS = ("thumb", "index", "middle", "ring")
-
-
-@dataclass(frozen=True)
-class Table:
-    """Figures to print and to write: every row has the same keys."""
-
-    title: str
-    rows: list[Row]
-
-
-@dataclass(frozen=True)
-class Workload:
-    """How much to run, on what, and whom to ask."""
-
-    estimate: Estimator
-    count: int
-    seed: int
-    sensors: tuple[str, ...]
-    structured: bool = False
-    progress: Progress = lambda runs: None
-
-    def __iter__(self) -> Iterator[int]:
-        """Sizes of batches that make up the count."""
-        for start in range(0, self.count, BATCH):
-            yield min(BATCH, self.count - start)
-
-    def share(self, parts: int) -> Workload:
-        """One of `parts` equal workloads, at least one run."""
-        return replace(self, count=max(1, round(self.count / parts)))
 
 
 def honesty_study(work: Workload) -> list[Table]:
