@@ -213,7 +213,7 @@ def _symmetric(x: Inputs, rng: np.random.Generator) -> Inputs:
 
 KINDS: dict[str, Kind] = {
     "any": lambda x, rng: x,
-    "tiny": _resized(-8, -3),
+    "tiny": _resized(-6, -3),
     "huge": _resized(2, 8),
     "any size": _resized(-6, 6),
     "far away": _far_away,
