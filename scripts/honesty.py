@@ -18,12 +18,11 @@ import numpy as np
 from scenarios import Scenes
 from scipy.stats import chi2
 
-from estimator.axis import chart_coordinates
 from estimator.batches import VERDICTS, AxisEstimates, ContactSets
 from estimator.contact import SensorNoise
 from estimator.information import contact_information, predicted_covariance
 from estimator.readings import UMBILIC
-from estimator.vectors import Array, Index, Mask
+from estimator.vectors import Array, Index, Mask, basis_across
 
 FREEDOM = 4
 COVERED = float(chi2.isf(0.05, FREEDOM))
@@ -100,9 +99,19 @@ def judged(sets: ContactSets, scenes: Scenes, estimates: AxisEstimates) -> Runs:
 
 
 def charted(origins: Array, u0: Array, points: Array, directions: Array) -> Array:
-    """Lines (B, 3), (B, 3), each in the chart at a line of its own, (B, 4)."""
-    lines = zip(origins, u0, points, directions, strict=True)
-    return np.concatenate([chart_coordinates(o, u, p[None], v[None]) for o, u, p, v in lines])
+    """`estimator.axis.to_chart` for lines (B, 3), (B, 3), each in a chart of its own, (B, 4)."""
+    u = directions * np.where(np.sum(directions * u0, axis=1) >= 0, 1.0, -1.0)[:, None]
+    basis = basis_across(u0)
+    sine = np.einsum("bjx,bx->bj", basis, u)
+    length = np.linalg.norm(sine, axis=1, keepdims=True)
+    cosine = np.sum(u * u0, axis=1, keepdims=True)
+    towards = sine / np.maximum(length, 1e-300)
+    foot = points - origins
+    foot = foot - np.sum(foot * u, axis=1, keepdims=True) * u
+    bent = (cosine - 1.0) * np.einsum("bj,bjx->bx", towards, basis) - length * u0
+    carried = basis + towards[:, :, None] * bent[:, None]
+    t = np.einsum("bjx,bx->bj", carried, foot)
+    return np.hstack([t, towards * np.arctan2(length, cosine)])
 
 
 def true_rows(sets: ContactSets, scenes: Scenes) -> Index:
