@@ -157,21 +157,55 @@ def test_estimate_axis_refuses_what_it_cannot_read(tmp_path):
     refused(script("estimate_axis", DATA / "table8.json", "--sensor", "nose"), "known are")
 
 
-def test_benchmark_runs(tmp_path):
+def test_benchmark_of_touches_runs(tmp_path):
     lines = tmp_path / "runs.jsonl"
-    done = script(
-        "benchmark", "--runs", 1, "--objects", "can", "--settings", "coarse", "--out", lines
-    )
+    chosen = ("--runs", 1, "--objects", "can", "--settings", "coarse", "--out", lines)
+    done = script("benchmark", "touches", *chosen)
     assert done.returncode == 0, done.stderr
     runs = [json.loads(line) for line in lines.read_text().splitlines()]
     assert [run["criterion"] for run in runs] == ["default", "random"]
 
 
+def test_benchmark_of_estimators_runs(tmp_path):
+    out = tmp_path / "ratios.json"
+    chosen = ("--objects", "barrel", "--sensors", "gel", "--arcs", "360", "--contacts", 3, 6)
+    done = script("benchmark", "estimators", "--runs", 2, "--batch", 4, *chosen, "--out", out)
+    assert done.returncode == 0, done.stderr
+    assert "6 contacts, 2 problems" in done.stdout
+    told = json.loads(out.read_text())
+    ratios = {
+        (f["contacts"], f["estimator"]): f["error_ratio"][0]
+        for f in told["figures"]
+        if f["setting"] == "all"
+    }
+    three = {name for contacts, name in ratios if contacts == 3}
+    assert three == {"ours", "ours, batch", "labels", "pyransac3d"}  # no five normals, no complex
+    assert {name for contacts, name in ratios if contacts == 6} == three | {"RANSAC", "complex"}
+    assert ratios[6, "ours"] == 1.0
+    assert ratios[6, "ours, batch"] == pytest.approx(1.0, abs=1e-3)
+    assert told["speed"]["triples_per_second"] > 0
+
+
 def test_benchmark_refuses_before_it_runs(tmp_path):
-    refused(script("benchmark", "--out", tmp_path), "")
-    refused(script("benchmark", "--settings", "easy"), "--settings: expected some of coarse")
-    refused(script("benchmark", "--objects", "teapot"), "teapot")
-    refused(script("benchmark", "--runs", 0), "--runs and --objects")
+    refused(script("benchmark", "touches", "--out", tmp_path), "")
+    refused(script("benchmark", "touches", "--settings", "easy"), "--settings: expected some of")
+    refused(script("benchmark", "touches", "--objects", "teapot"), "teapot")
+    refused(script("benchmark", "touches", "--runs", 0), "--runs and --objects")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--contacts", "2"), "--contacts: expected numbers from 3 to 100"),
+        (("--objects", "teapot"), "--objects: expected some of barrel"),
+        (("--sensors", "nose"), "sensor 'nose' is unknown; known are ideal"),
+        (("--arcs", "90"), "--arcs: expected some of 240, 360"),
+        (("--runs", "0"), "--runs, --batch: expected at least one"),
+        (("--out", "nowhere/ratios.json"), "there is no such folder"),
+    ],
+)
+def test_benchmark_of_estimators_refuses_before_it_runs(arguments, message):
+    refused(script("benchmark", "estimators", *arguments), message)
 
 
 @pytest.mark.parametrize("name", ["plan_grasp", "estimate_axis", "benchmark"])
