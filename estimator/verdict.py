@@ -128,7 +128,7 @@ def _coincide(readings: Readings, reference: int) -> Mask:
     mean = np.linalg.eigh(np.einsum("snx,sny->sxy", chosen, chosen))[1][..., -1]
     sine = 1.0 - np.einsum("snx,sx->sn", chosen, mean) ** 2
     D = 0.5 * np.abs(readings[..., KAPPA] - readings[..., KAPPA + 1])
-    var_turn = (readings[..., SD_K_TZ] / np.maximum(2.0 * D, 1e-300)) ** 2
+    var_turn = (readings[..., SD_K_TZ] / np.maximum(2.0 * D, 1e-9)) ** 2
     var_turn = var_turn + readings[..., SD_DIRECTION] ** 2 + readings[..., SD_NORMAL] ** 2
     p = readings[..., POSITION:NORMAL]
     centred = p - p.mean(axis=1, keepdims=True)

@@ -10,7 +10,7 @@ import pytest
 from estimator.axis import Axis
 from estimator.fusion import estimate_axis
 from estimator.profile import barrel, cylinder
-from estimator.readings import VOID_DIRECTION, readings_of
+from estimator.readings import SD_DIRECTION, VOID, readings_of
 from estimator.records import contacts_from_record, estimate_record, read_contacts
 from estimator.sensors import SENSORS
 from estimator.surface import Place, SurfaceOfRevolution
@@ -68,8 +68,9 @@ def test_curvatures_that_were_not_measured_leave_directions_with_their_usual_noi
     for entry in data["contacts"]:
         entry["curvatures"] = None
     contacts = contacts_from_record(data, NOISE)
-    sd = np.sqrt(readings_of(contacts).var_psi)
-    np.testing.assert_allclose(sd, NOISE.deviator / 33.7)
+    readings = readings_of(contacts)[0]
+    np.testing.assert_allclose(readings[:, SD_DIRECTION], NOISE.deviator / 33.7)
+    assert not np.any(readings[:, VOID])
     assert not any("umbilic" in reason for reason in estimate_axis(contacts).reasons)
 
 
@@ -78,7 +79,7 @@ def test_two_nulls_are_a_flat_end_whose_directions_say_nothing():
     data["contacts"][0]["curvatures"] = [None, None]
     contacts = contacts_from_record(data, NOISE)
     assert contacts[0].umbilicity == 0.0
-    assert readings_of(contacts).var_psi[0, 0] == VOID_DIRECTION**2
+    assert readings_of(contacts)[0, 0, VOID] == 1.0
 
 
 @pytest.mark.parametrize("seed", range(10))
