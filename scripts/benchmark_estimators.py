@@ -142,7 +142,7 @@ def _median_seconds(work: Callable[[int], object], turns: range) -> float:
 
 
 def _table(n: int, problems: int, figures: list[Figures]) -> Table:
-    table = Table(title=f"{n} contacts, {problems} problems", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    table = Table(title=f"{n} contacts, {problems} problems", box=SIMPLE_HEAD, padding=0)
     table.add_column("estimator")
     for heading in ("deg off", "mm", f">{FAR_DEG:g} deg", "error/ours", "ms", "time/ours"):
         table.add_column(heading, justify="right", no_wrap=True)

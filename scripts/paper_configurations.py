@@ -29,7 +29,7 @@ WAVY = PolynomialProfile((1.0, 1.0, 0.0, -500.0 / 9.0, 0.0, 1e4 / 27.0), (-0.32,
 SHOULDERS = PolynomialProfile((1.0, 0.0, -0.6, 0.0, 0.5), (-0.8, 0.8))
 BULGING = PolynomialProfile((1.0, 0.1, -0.5, 0.4), (-0.7, 0.7))  # umbilic at one height only
 
-_SKEW = Axis([0.4, -0.2, 0.1], [1.0, 2.0, -1.5])
+_SKEW = Axis(np.array([0.4, -0.2, 0.1]), np.array([1.0, 2.0, -1.5]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,6 +142,6 @@ def all_swapped(heights: tuple[float, float, float], rng: np.random.Generator) -
 def umbilic_height() -> float:
     """Where (63) holds on BULGING."""
     c = np.polynomial.Polynomial(BULGING.coefficients)
-    roots = (c * c.deriv(2) + c.deriv(1) ** 2 + 1.0).roots()
+    roots = np.asarray((c * c.deriv(2) + c.deriv(1) ** 2 + 1.0).roots(), complex)
     low, high = BULGING.z_range
     return next(float(x.real) for x in roots if abs(x.imag) < 1e-9 and low < x.real < high)

@@ -34,7 +34,9 @@ PRINTED_Z = {
     "table7": (4.35, 4.47, 5.13),
     "table8": (5.58, 6.07, 6.5, 4.93, 6.00, 5.45, 5.34, 5.89, 5.53, 5.05, 5.05, 5.05),
 }
-PRINTED_ERRORS = {  # one column a contact: |dp| [in], angles of n, k_z, k_theta [deg]
+PRINTED_ERRORS: dict[
+    str, dict[str, tuple[float, ...]]
+] = {  # one column a contact: |dp| [in], angles of n, k_z, k_theta [deg]
     "table7": {"p": (0.07, 0.01, 0.05), "k_z": (8.7, 3.0, 0.8), "k_theta": (9.4, 5.2, 4.9)},
     "table8": {
         "p": (0.09, 0.05, 0.07, 0.01, 0.04, 0.04, 0.06, 0.07, 0.08, 0.06, 0.06, 0.06),
@@ -154,4 +156,4 @@ def turns(experiment: Experiment) -> Array:
         seen = seen * np.sign(np.sum(seen * was, axis=1, keepdims=True))
         turned = np.sum(np.cross(was, seen) * n, axis=1)
         angles.append(np.arctan2(turned, np.sum(was * seen, axis=1)))
-    return np.rad2deg(np.mean(angles, axis=0))
+    return np.asarray(np.rad2deg(np.mean(angles, axis=0)))

@@ -20,7 +20,7 @@ END = """## What is not here
 - The curves and points of Figures 5, 8 and 13 as drawn: we have the paper's text, not its drawings.
   The figures are regenerated from the equations and data they show and compared with what the
   text says of them. The paper does not say for which radii Figures 5 and 8 are drawn.
-- Figures 1-4, 6, 7, 9-12 and 16 are sketches and photographs."""
+- Figures 1-4, 6, 7, 9-12 and 16 are sketches, views of the planes of Table 7, and photographs."""
 
 Verdict = Literal["reproduced", "reproduced, print corrected", "not reproduced"]
 

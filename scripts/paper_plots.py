@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
 
 import matplotlib
 
@@ -28,6 +29,7 @@ RHO = r"$\rho_\theta$"
 SEPARATION = r"$\theta_2 - \theta_1$, deg"
 POSITION_ERROR = r"position error $\delta$, in"
 ORIENTATION_ERROR = r"orientation error $\varphi$, deg"
+Corner = Literal["best", "upper left", "upper center", "center right"]
 _DEG = np.pi / 180.0
 _DOTS = {"marker": "o", "mfc": "none", "color": PRINT, "ls": ""}
 
@@ -104,7 +106,7 @@ def figure_13(panels: Sequence[tuple[str, Accepted]]) -> Figure:
     return figure
 
 
-def _label(axes: Axes, x: str, y: str, title: str, *, legend: str = "best") -> None:
+def _label(axes: Axes, x: str, y: str, title: str, *, legend: Corner = "best") -> None:
     axes.set_xlabel(x)
     axes.set_ylabel(y)
     axes.set_title(title, fontsize=10)

@@ -57,7 +57,7 @@ def yes(agrees: bool) -> str:
 
 _SAME = [[1, 0, 0], [-1, 0, 0], [1, 0, 0]]
 _PAIR = [[1, 0, 0], [0, 1, 0], [0, -1, 0]]
-_FAN = [[1, 0, 0], [0, 1, 0], [0.6, 0.8, 0]]
+_FAN = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.6, 0.8, 0.0]]
 _CORNER = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
 _Planes = tuple[Sequence[Sequence[float]], Sequence[float]]
 _TABLE_1: dict[Meeting, tuple[tuple[int, int], _Planes]] = {

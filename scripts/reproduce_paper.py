@@ -91,7 +91,7 @@ def _reproduce() -> tuple[list[Section], str, dict[str, Figure]]:
         "figure_8.png": paper_plots.figure_8(),
         "figure_13.png": paper_plots.figure_13([*panels, ("estimate_axis, all 120", own)]),
     }
-    text = page(sections, [*theory_errata(rng), *experiment_errata(first, second)])
+    text = page(sections, [*theory_errata(), *experiment_errata(first, second)])
     return sections, text + "\n", figures
 
 

@@ -14,7 +14,7 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
-from honesty import bootstrap, efficiency, joined, judged, proportion, wrong
+from honesty import bootstrap, efficiency, joined, judged, proportion, wrong_shares
 from scenarios import Scenes, posed
 from scipy.interpolate import RectBivariateSpline
 from studies import against_bound
@@ -173,7 +173,7 @@ def _touched(
         "contacts": contacts,
         "runs": len(sure),
         **{name: proportion(runs.verdict == k) for k, name in enumerate(VERDICTS)},
-        "sure but wrong": proportion(wrong(runs)),
+        **wrong_shares(runs),
         "labels right": proportion(runs.right[sure & runs.labelled]),
         "median deg": bootstrap(angle, np.median),
         "p90 deg": float(np.percentile(angle, 90)) if len(angle) else np.nan,

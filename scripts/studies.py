@@ -17,7 +17,7 @@ from honesty import (
     judged,
     mean_nees,
     proportion,
-    wrong,
+    wrong_shares,
 )
 from scenarios import FAMILIES, Scenes, draw_scenes
 from workload import Row, Table, Workload
@@ -78,7 +78,7 @@ def _honest(runs: Runs) -> Row:
         **{name: proportion(runs.verdict == i) for i, name in enumerate(VERDICTS)},
         "mean NEES": mean_nees(runs),
         "covered": coverage(runs),
-        "sure but wrong": proportion(wrong(runs)[sure]),
+        **wrong_shares(runs),
         "labels right": proportion(runs.right[sure & runs.labelled]),
         "median deg": float(np.rad2deg(np.median(runs.angle[sure]))) if sure.any() else np.nan,
         "misfit": proportion(runs.p_value < 1e-4),
