@@ -287,7 +287,10 @@ def _prior_cost(bg: Background, s: int, x: Array, derivatives: bool, work: Work)
                     for i in range(j + 1):
                         P_km = row[PRECISION + 4 * k + m]
                         work.fisher[j, i] += work.chart[k, j] * P_km * work.chart[m, i]
-    return 0.5 * (here[0] * y[0] + here[1] * y[1] + here[2] * y[2] + here[3] * y[3])
+    cost = 0.0
+    for j in range(4):
+        cost += 0.5 * here[j] * y[j]
+    return cost
 
 
 @compiled

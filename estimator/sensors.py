@@ -17,9 +17,9 @@ SENSORS: dict[str, SensorNoise] = {
     "ideal": SensorNoise(1e-6, 1e-5, 0.0, 1e-3, 1e-3, 1e-5, 1e-3),
     # Table 7 read as two sigma: the one-curvature algorithm on a machinist's table
     "fearing1988": SensorNoise(0.127e-3, 0.57 * _DEG, 0.0, 0.69, 1.0, 0.12, 3.0),
-    # Table 8: three degrees of scatter on top of an offset of about eight, radii within 40 %
+    # Table 8: three degrees of scatter on top of an offset of about eight, radii within 26 %
     "robotworld": SensorNoise(
-        0.25e-3, 3.0 * _DEG, 3.0 * _DEG, 0.5, 2.0, 0.4, 5.9, direction_offset=10.0 * _DEG
+        0.25e-3, 3.0 * _DEG, 3.0 * _DEG, 0.5, 2.0, 0.26, 5.9, direction_offset=10.0 * _DEG
     ),
     "taxel": SensorNoise(0.15e-3, 1.4 * _DEG, 0.0, 1.0, 1.7, 0.10, 3.0),
     "gel": SensorNoise(0.10e-3, 0.7 * _DEG, 0.0, 1.2, 1.7, 0.046, 3.0),
