@@ -17,7 +17,8 @@ from honesty import judged, proportion
 from scenarios import FAMILIES, Scenes, Shapes, draw_scenes, draw_shapes, posed, upright
 from workload import Row, Table, Workload
 
-from estimator.batches import VERDICTS, ContactSets
+from estimator.batches import ContactSets
+from estimator.estimate import VERDICTS
 from estimator.fusion import estimate_axis
 from estimator.sensors import SENSORS
 from estimator.surface import Geometry

@@ -19,8 +19,9 @@ import numpy as np
 from scenarios import Scenes
 from scipy.stats import chi2
 
-from estimator.batches import VERDICTS, AxisEstimates, ContactSets
+from estimator.batches import AxisEstimates, ContactSets
 from estimator.contact import SensorNoise
+from estimator.estimate import VERDICTS
 from estimator.information import contact_information, predicted_covariance
 from estimator.readings import UMBILIC
 from estimator.vectors import Array, Index, Mask, basis_across

@@ -20,7 +20,7 @@ from scipy.interpolate import RectBivariateSpline
 from studies import against_bound
 from workload import Row, Table, Workload
 
-from estimator.batches import VERDICTS
+from estimator.estimate import VERDICTS
 from estimator.profile import SplineProfile, spline_through
 from estimator.sensors import SENSORS
 from estimator.surface import Geometry

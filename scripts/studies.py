@@ -22,8 +22,9 @@ from honesty import (
 from scenarios import FAMILIES, Scenes, draw_scenes
 from workload import Row, Table, Workload
 
-from estimator.batches import VERDICTS, AxisEstimates
+from estimator.batches import AxisEstimates
 from estimator.contact import SensorNoise
+from estimator.estimate import VERDICTS
 from estimator.sensors import SENSORS
 from sim_sensor.batch_noise import read_sets
 from sim_sensor.noise import SimulatedSensor, simulated_sensor
