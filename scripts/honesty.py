@@ -23,7 +23,7 @@ from estimator.batches import AxisEstimates, ContactSets
 from estimator.contact import SensorNoise
 from estimator.estimate import VERDICTS
 from estimator.information import contact_information, predicted_covariance
-from estimator.readings import UMBILIC
+from estimator.readings import VOID, readings_of_sets
 from estimator.vectors import Array, Index, Mask, basis_across
 
 FREEDOM = 4
@@ -57,7 +57,7 @@ class Runs:
         verdict: Index into VERDICTS, (B,).
         p_value: Of the fit, (B,).
         stated: Probability of the likeliest labelling, (B,).
-        labelled: Every contact has a direction to label, none is umbilic within noise, (B,).
+        labelled: Every contact has directions to label, none is umbilic within noise, (B,).
         right: All labels right, (B,).
     """
 
@@ -95,7 +95,7 @@ def judged(sets: ContactSets, scenes: Scenes, estimates: AxisEstimates) -> Runs:
         verdict=estimates.verdicts,
         p_value=estimates.p_values,
         stated=estimates.label_probabilities,
-        labelled=np.all(umbilicity(sets) >= UMBILIC, axis=1),
+        labelled=labelled(sets),
         right=np.all((estimates.parallel_rows < 0.5) == (rows == 1), axis=1),
     )
 
@@ -122,11 +122,9 @@ def true_rows(sets: ContactSets, scenes: Scenes) -> Index:
     return np.argmax(np.abs(along), axis=-1)
 
 
-def umbilicity(sets: ContactSets) -> Array:
-    """As `Contact.umbilicity`, (B, n)."""
-    kappa = np.nan_to_num(sets.curvatures)
-    half = 0.5 * np.abs(kappa[..., 0] - kappa[..., 1])
-    return np.asarray(half / max(sets.noise.deviator, 1e-12))
+def labelled(sets: ContactSets) -> Mask:
+    """Whether every contact has directions to label: none is held umbilic, (B,)."""
+    return np.all(readings_of_sets(sets)[..., VOID] == 0.0, axis=1)
 
 
 def beyond(runs: Runs) -> Mask:
@@ -140,8 +138,12 @@ def far(runs: Runs) -> Mask:
 
 
 def wrong_shares(runs: Runs) -> dict[str, Share]:
-    """`determined` and wrong, of all runs, either way."""
-    return {"beyond 4 sd": proportion(beyond(runs)), "over 10 deg": proportion(far(runs))}
+    """`determined` and wrong, of all runs: in either way, and in any."""
+    return {
+        "beyond 4 sd": proportion(beyond(runs)),
+        "over 10 deg": proportion(far(runs)),
+        "either": proportion(beyond(runs) | far(runs)),
+    }
 
 
 def mean_nees(runs: Runs) -> Interval:

@@ -43,7 +43,7 @@ from workload import Cell, Table, Workload
 from estimator.fusion import estimate_axes
 from estimator.sensors import SENSORS
 
-WIDTH = 120  # of the tables, where the terminal has less
+WIDTH = 140  # of the tables, where the terminal has less
 STUDIES: dict[str, tuple[Callable[[Workload], list[Table]], int]] = {
     "honesty": (honesty_study, 16800),
     "efficiency": (efficiency_study, 16800),

@@ -14,12 +14,13 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
-from honesty import bootstrap, efficiency, joined, judged, proportion, wrong_shares
+from honesty import Runs, bootstrap, efficiency, joined, judged, proportion, wrong_shares
 from scenarios import Scenes, posed
 from scipy.interpolate import RectBivariateSpline
 from studies import against_bound
 from workload import Row, Table, Workload
 
+from estimator.assumptions import Assumptions
 from estimator.estimate import VERDICTS
 from estimator.profile import SplineProfile, spline_through
 from estimator.sensors import SENSORS
@@ -136,37 +137,62 @@ def _principal(tangent: Array, slope: Array, hessian: Array) -> tuple[Array, Arr
 
 
 def scan_study(work: Workload) -> list[Table]:
-    """Determined and wrong on a real surface; what is lost on a clean one."""
+    """Determined and wrong on a real surface; what robustness costs on a clean one."""
     assert work.objects is not None
     scan = load_scan(work.objects)
     cells = list(product(work.sensors, COUNTS))
     part = work.share(2 * len(cells))
     tables = [_felt_table(scan, work.seed)]
     for title, surface in ((f"Touches of {scan.name}", scan), ("Its bare profile", _bare(scan))):
-        rows = [
-            _touched(part, surface, *cell, rng=np.random.default_rng([work.seed, 7, i]))
+        found = {
+            cell: _touched(part, surface, *cell, rng=np.random.default_rng([work.seed, 7, i]))
             for i, cell in enumerate(cells)
-        ]
+        }
+        rows = [_row(*map(str, cell), found[cell]) for cell in cells]
+        rows += [_row(s, "all", _pooled([found[s, n] for n in COUNTS])) for s in work.sensors]
         tables.append(Table(title, rows))
     return tables
 
 
+@dataclass(frozen=True, eq=False)
+class Touched:
+    """Runs with their errors in the chart at the truth (B, 4), those of an estimator that knows no
+    gross errors, and the bounds (B, 4, 4).
+    """
+
+    runs: Runs
+    error: Array
+    trusting: Array
+    bound: Array
+
+
+def _pooled(parts: list[Touched]) -> Touched:
+    arrays = (
+        np.concatenate([getattr(p, k) for p in parts]) for k in ("error", "trusting", "bound")
+    )
+    return Touched(joined([p.runs for p in parts]), *arrays)
+
+
 def _touched(
     work: Workload, scan: Scan, sensor: str, contacts: int, *, rng: np.random.Generator
-) -> Row:
-    parts, errors = [], []
+) -> Touched:
+    parts = []
     for size in work:
         scenes = draw_touches(scan, size, contacts, rng=rng)
         sets = read_sets(
             SimulatedSensor(SENSORS[sensor], SENSORS[sensor]), scenes.geometry, rng=rng
         )
         estimates = work.estimate(sets)
-        parts.append(judged(sets, scenes, estimates))
-        errors.append(against_bound(scenes, estimates, sets.noise))
+        error, bound = against_bound(scenes, estimates, sets.noise)
+        plain = work.estimate(sets, assumptions=Assumptions(gross_error=0.0))
+        trusting, _ = against_bound(scenes, plain, sets.noise)
+        parts.append(Touched(judged(sets, scenes, estimates), error, trusting, bound))
         work.progress(size)
-    runs = joined(parts)
-    sure = runs.determined
-    error, bound = (np.concatenate([e[k] for e in errors])[sure] for k in (0, 1))
+    return _pooled(parts)
+
+
+def _row(sensor: str, contacts: str, found: Touched) -> Row:
+    runs, sure = found.runs, found.runs.determined
     angle = np.rad2deg(runs.angle[sure])
     return {
         "sensor": sensor,
@@ -177,7 +203,8 @@ def _touched(
         "labels right": proportion(runs.right[sure & runs.labelled]),
         "median deg": bootstrap(angle, np.median),
         "p90 deg": float(np.percentile(angle, 90)) if len(angle) else np.nan,
-        "RMSE / bound": efficiency(error, bound).whole,
+        "RMSE / bound": efficiency(found.error[sure], found.bound[sure]).whole,
+        "not robust": efficiency(found.trusting[sure], found.bound[sure]).whole,
     }
 
 

@@ -5,12 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Protocol
 
 from honesty import Interval
 
+from estimator.assumptions import Assumptions
 from estimator.batches import AxisEstimates, ContactSets
 
-Estimator = Callable[[ContactSets], AxisEstimates]
+
+class Estimator(Protocol):
+    """`estimator.fusion.estimate_axes`, or what stands for it."""
+
+    def __call__(self, sets: ContactSets, *, assumptions: Assumptions = ...) -> AxisEstimates: ...
+
+
 Cell = float | int | str | Interval
 Row = dict[str, Cell]
 Progress = Callable[[int], None]  # called with the number of runs just finished
