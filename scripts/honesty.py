@@ -151,6 +151,12 @@ def mean_nees(runs: Runs) -> Interval:
     return bootstrap(runs.nees[runs.determined], np.mean)
 
 
+def mean_nees_within(runs: Runs) -> Interval:
+    """The same without runs beyond four sigma, one of which can outweigh all others."""
+    nees = runs.nees[runs.determined]
+    return bootstrap(nees[nees <= FOUR_SIGMA], np.mean)
+
+
 def coverage(runs: Runs) -> Share:
     """Of the 95 % regions, over determined runs."""
     return proportion(runs.nees[runs.determined] < COVERED)
@@ -236,7 +242,8 @@ def proportion(hits: Mask) -> Share:
     z, share = 1.959964, float(np.mean(hits))
     middle = (share + z * z / (2 * count)) / (1 + z * z / count)
     half = z * np.sqrt(share * (1 - share) / count + (z / (2 * count)) ** 2) / (1 + z * z / count)
-    return Share(share, max(0.0, float(middle - half)), min(1.0, float(middle + half)))
+    low, high = max(0.0, float(middle - half)), min(1.0, float(middle + half))
+    return Share(share, min(share, low), max(share, high))  # but for rounding
 
 
 def bootstrap(

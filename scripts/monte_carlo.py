@@ -20,9 +20,7 @@ Examples:
 from __future__ import annotations
 
 import json
-import os
 import sys
-import tempfile
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -32,11 +30,13 @@ import tyro
 from degenerate import degenerate_study
 from fuzz import fuzz_study
 from honesty import Interval, Share
+from output_files import require_writable, write_whole
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table as RichTable
-from scan import load_scan, scan_study
+from scan import load_scan
+from scan_study import scan_study
 from studies import bias_study, efficiency_study, honesty_study
 from workload import Cell, Table, Workload
 
@@ -92,7 +92,9 @@ def main() -> int:
             console.print(_printed(table))
     if options.out is not None:
         try:
-            _write(options.out, json.dumps(_document(options, tables), indent=1, allow_nan=False))
+            text = json.dumps(_document(options, tables), indent=1, allow_nan=False)
+            options.out.parent.mkdir(parents=True, exist_ok=True)
+            write_whole(options.out, (text + "\n").encode())
         except OSError as error:
             print(f"monte_carlo: --out {options.out}: cannot be written ({error})", file=sys.stderr)
             return 2
@@ -112,8 +114,8 @@ def _require_sane(options: Options) -> None:
         raise ValueError(f"--seed: expected a number >= 0, got {options.seed}")
     if options.objects is not None and "scan" in options.only:
         load_scan(options.objects)
-    if options.out is not None and not options.out.absolute().parent.is_dir():
-        raise ValueError(f"--out {options.out}: there is no such folder")
+    if options.out is not None:
+        require_writable(options.out.parent)
 
 
 def _run(name: str, options: Options, console: Console) -> list[Table]:
@@ -173,19 +175,6 @@ def _plain(cell: Cell) -> object:
     if isinstance(cell, Interval):
         return {name: _plain(value) for name, value in cell._asdict().items()}
     return None if isinstance(cell, float) and not np.isfinite(cell) else cell
-
-
-def _write(path: Path, text: str) -> None:
-    """Whole or not at all."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text + "\n")
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
 
 
 if __name__ == "__main__":

@@ -1,37 +1,27 @@
-"""Point 6: touches of a scanned product, whose dents and seams turn its principal directions.
+"""A scanned product as a fingertip feels it: dents and seams turn its principal directions.
 
 A scan is a JSON file of a profile (`z_mm`, `r_mm`) with a residual map `r_minus_profile` [mm],
 rows by height and columns by meridian angle. A fingertip feels the quadric that fits the surface
 best over a patch of its own size, so its directions err with heavy tails that no sensor's noise
-explains. The same places on the bare profile are the clean comparison.
+explains. `bare` is the profile alone, the clean comparison.
 """
 
 from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from itertools import product
 from pathlib import Path
 
 import numpy as np
-from honesty import Runs, bootstrap, efficiency, joined, judged, proportion, wrong_shares
 from scenarios import Scenes, posed
 from scipy.interpolate import RectBivariateSpline
-from studies import against_bound
-from workload import Row, Table, Workload
 
-from estimator.assumptions import Assumptions
-from estimator.estimate import VERDICTS
 from estimator.profile import SplineProfile, spline_through
-from estimator.sensors import SENSORS
 from estimator.surface import Geometry
 from estimator.vectors import Array, cross, unit
-from sim_sensor.batch_noise import read_sets
-from sim_sensor.noise import SimulatedSensor
 
 PATCH = 3e-3  # radius of the fingertip's contact patch [m]
 RIM = 8e-3  # kept away from both ends [m]
-COUNTS = (3, 4, 5, 6, 8, 10)
 WRAPPED = 4  # columns repeated at both sides, so that the map closes
 
 
@@ -136,100 +126,6 @@ def _principal(tangent: Array, slope: Array, hessian: Array) -> tuple[Array, Arr
     return kappa, np.swapaxes(vectors, -1, -2) @ whiten @ tangent
 
 
-def scan_study(work: Workload) -> list[Table]:
-    """Determined and wrong on a real surface; what robustness costs on a clean one."""
-    assert work.objects is not None
-    scan = load_scan(work.objects)
-    cells = list(product(work.sensors, COUNTS))
-    part = work.share(2 * len(cells))
-    tables = [_felt_table(scan, work.seed)]
-    for title, surface in ((f"Touches of {scan.name}", scan), ("Its bare profile", _bare(scan))):
-        found = {
-            cell: _touched(part, surface, *cell, rng=np.random.default_rng([work.seed, 7, i]))
-            for i, cell in enumerate(cells)
-        }
-        rows = [_row(*map(str, cell), found[cell]) for cell in cells]
-        rows += [_row(s, "all", _pooled([found[s, n] for n in COUNTS])) for s in work.sensors]
-        tables.append(Table(title, rows))
-    return tables
-
-
-@dataclass(frozen=True, eq=False)
-class Touched:
-    """Runs with their errors in the chart at the truth (B, 4), those of an estimator that knows no
-    gross errors, and the bounds (B, 4, 4).
-    """
-
-    runs: Runs
-    error: Array
-    trusting: Array
-    bound: Array
-
-
-def _pooled(parts: list[Touched]) -> Touched:
-    arrays = (
-        np.concatenate([getattr(p, k) for p in parts]) for k in ("error", "trusting", "bound")
-    )
-    return Touched(joined([p.runs for p in parts]), *arrays)
-
-
-def _touched(
-    work: Workload, scan: Scan, sensor: str, contacts: int, *, rng: np.random.Generator
-) -> Touched:
-    parts = []
-    for size in work:
-        scenes = draw_touches(scan, size, contacts, rng=rng)
-        sets = read_sets(
-            SimulatedSensor(SENSORS[sensor], SENSORS[sensor]), scenes.geometry, rng=rng
-        )
-        estimates = work.estimate(sets)
-        error, bound = against_bound(scenes, estimates, sets.noise)
-        plain = work.estimate(sets, assumptions=Assumptions(gross_error=0.0))
-        trusting, _ = against_bound(scenes, plain, sets.noise)
-        parts.append(Touched(judged(sets, scenes, estimates), error, trusting, bound))
-        work.progress(size)
-    return _pooled(parts)
-
-
-def _row(sensor: str, contacts: str, found: Touched) -> Row:
-    runs, sure = found.runs, found.runs.determined
-    angle = np.rad2deg(runs.angle[sure])
-    return {
-        "sensor": sensor,
-        "contacts": contacts,
-        "runs": len(sure),
-        **{name: proportion(runs.verdict == k) for k, name in enumerate(VERDICTS)},
-        **wrong_shares(runs),
-        "labels right": proportion(runs.right[sure & runs.labelled]),
-        "median deg": bootstrap(angle, np.median),
-        "p90 deg": float(np.percentile(angle, 90)) if len(angle) else np.nan,
-        "RMSE / bound": efficiency(found.error[sure], found.bound[sure]).whole,
-        "not robust": efficiency(found.trusting[sure], found.bound[sure]).whole,
-    }
-
-
-def _felt_table(scan: Scan, seed: int, count: int = 20000) -> Table:
-    """What the patch makes of directions and normals, before any sensor's noise."""
-    touched = draw_touches(scan, count, 1, rng=np.random.default_rng([seed, 8]))
-    g, u = touched.geometry, touched.directions[:, None]
-    out = g.p - touched.points[:, None]
-    e = unit(cross(u, out))
-    psi = np.rad2deg(np.abs(np.arcsin(np.clip(np.sum(g.k_z * e, axis=-1), -1, 1)))).ravel()
-    tilt = np.rad2deg(np.abs(np.arcsin(np.clip(np.sum(g.n * e, axis=-1), -1, 1)))).ravel()
-    rows: list[Row] = [
-        {"off the meridian plane": name, "places": count, **_quantiles(values)}
-        for name, values in (("meridian direction", psi), ("normal", tilt))
-    ]
-    return Table(f"{scan.name} as a {1e3 * PATCH:g} mm patch feels it, no noise", rows)
-
-
-def _quantiles(degrees: Array) -> Row:
-    return {
-        f"p{q} deg": bootstrap(degrees, lambda x, axis, q=q: np.percentile(x, q, axis=axis))
-        for q in (50, 90)
-    }
-
-
 def draw_touches(scan: Scan, count: int, contacts: int, *, rng: np.random.Generator) -> Scenes:
     """Random places, away from the rims, in random poses."""
     low, high = scan.profile.z_range
@@ -238,7 +134,7 @@ def draw_touches(scan: Scan, count: int, contacts: int, *, rng: np.random.Genera
     return posed(felt(scan, theta, z), scan.radius(np.zeros(count), np.zeros(count)), rng=rng)
 
 
-def _bare(scan: Scan) -> Scan:
+def bare(scan: Scan) -> Scan:
     """The profile alone."""
     low, high = scan.profile.z_range
     flat = RectBivariateSpline(np.linspace(low, high, 4), np.linspace(-1, 8, 4), np.zeros((4, 4)))

@@ -16,6 +16,7 @@ from honesty import (
     joined,
     judged,
     mean_nees,
+    mean_nees_within,
     proportion,
     wrong_shares,
 )
@@ -78,6 +79,7 @@ def _honest(runs: Runs) -> Row:
         "runs": len(runs.nees),
         **{name: proportion(runs.verdict == i) for i, name in enumerate(VERDICTS)},
         "mean NEES": mean_nees(runs),
+        "within 4 sd": mean_nees_within(runs),
         "covered": coverage(runs),
         **wrong_shares(runs),
         "labels right": proportion(runs.right[sure & runs.labelled]),

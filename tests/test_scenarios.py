@@ -11,7 +11,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
-import fuzz
+import fuzz_inputs
 import honesty
 import scan
 from scenarios import FAMILIES, RADII, draw_scenes, draw_shapes
@@ -189,10 +189,10 @@ def test_a_folder_without_a_residual_map_is_refused(tmp_path: Path) -> None:
         scan.load_scan(tmp_path)
 
 
-@pytest.mark.parametrize("kind", fuzz.KINDS)
+@pytest.mark.parametrize("kind", fuzz_inputs.KINDS)
 def test_fuzz_draws_what_a_contact_accepts(kind: str) -> None:
     for seed in range(6):
-        sets = fuzz.draw_inputs(kind, 8, rng=np.random.default_rng(seed))
+        sets = fuzz_inputs.draw_inputs(kind, 8, rng=np.random.default_rng(seed))
         for i in range(len(sets)):
             contacts = sets.take(i)  # Contact checks frames and numbers
             if kind != "nearly one point":
