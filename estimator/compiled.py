@@ -1,11 +1,17 @@
 """Functions compiled to machine code: the inner loops of the estimator.
 
-Compiled once a machine (half a minute at the first call), then loaded from numba's cache.
+Compiled once a machine (half a minute at the first call), then loaded from the user's cache
+folder: AXIS_BY_TOUCH_CACHE, else XDG_CACHE_HOME, else ~/.cache. numba renews a function only when
+its own file changes, although it holds the code of every function it calls; so the folder is named
+after all of this package's sources.
 """
 
 from __future__ import annotations
 
+import hashlib
+import os
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
@@ -14,9 +20,27 @@ F = TypeVar("F", bound=Callable[..., Any])
 V3 = tuple[float, float, float]
 
 
+def _folder() -> Path:
+    """Where code compiled from exactly these sources is kept."""
+    digest = hashlib.sha256()
+    for path in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(path.read_bytes())
+    named = os.environ.get("AXIS_BY_TOUCH_CACHE")
+    user = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "axis-by-touch"
+    return (Path(named) if named else user) / f"compiled-{digest.hexdigest()[:16]}"
+
+
+_FOLDER = str(_folder())
+
+
 def compiled(function: F) -> F:
     """numba.njit that a type checker sees through; division by zero gives inf, as in numpy."""
-    return cast(F, numba.njit(cache=True, error_model="numpy")(function))
+    other = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = _FOLDER  # read while a function is decorated
+    try:
+        return cast(F, numba.njit(cache=True, error_model="numpy")(function))
+    finally:
+        numba.config.CACHE_DIR = other
 
 
 @compiled

@@ -27,7 +27,7 @@ class SensorNoise:
     direction grows as 1/|kappa_1 - kappa_2| and an umbilic has no direction at all.
 
     Args:
-        position: Each coordinate across the normal [m].
+        position: Each coordinate [m].
         normal: Tilt of the normal about each tangent axis [rad].
         direction: Rotation of the directions about the normal beyond the tensor's [rad].
         deviator: Of K_xy, which equals that of (K_xx - K_yy)/2 [1/m].

@@ -139,9 +139,10 @@ def fit_of(row: Array, seen: Seen, scale: float) -> Fit:
     curve = (exp(-scale) if scale != 0.0 else 1.0) / seen.r
     K = 0.5 * (row[KAPPA] + row[KAPPA + 1] + w)
     censored = row[CENSORED] if seen.c2 >= 0.0 else row[CENSORED + 1]
-    c, F_g, F_K, width, volume = _curvature_fit(row, seen.m_n * curve, K, censored > 0.0)
+    g = seen.m_n * curve
+    c, F_g, F_K, width, volume = _curvature_fit(row, g, K, censored > 0.0)
     if F_K > 0.0:
-        width = 1.0 + (F_g * seen.m_u * curve) ** 2 * C_bb
+        width = 1.0 + F_g**2 * (tau * g**2 + (seen.m_u * curve * row[SD_NORMAL]) ** 2)
         c /= sqrt(width)
     volume *= C_bb * l22 * l22 * width
     log_density = -0.5 * (a * a + b * b + c * c + log(volume))
@@ -214,7 +215,8 @@ def fill_derivatives(
     bb, bx, xx = 0.5 * (C_xx / det - y_b**2), -C_bx / det - y_b * y_x, 0.5 * (C_bb / det - y_x**2)
     plain = 0.5 * (1.0 - fit.a**2) / C_bb
     g, share, root = m_n * fit.curve, row[SD_SHARE], sqrt(fit.width)
-    T = fit.F_g * m_u * fit.curve
+    T = fit.F_g * m_u * fit.curve * row[SD_NORMAL]
+    U = fit.F_g**2 * fit.tau * g**2
     tau, w = fit.tau, fit.w
     for j in range(locals_):
         d_mn, d_mu, d_theta, d_r = rows[MN, j], rows[MU, j], rows[THETA, j], rows[R, j] / seen.r
@@ -231,9 +233,9 @@ def fill_derivatives(
         slope = fit.a * j_a + fit.b * j_b + bb * d_bb + bx * d_bx + xx * d_xx
         if fit.F_K > 0.0:
             d_K = -fit.v * d_theta
-            d_T = -((share * fit.F_g) ** 2) * g * d_g * T
-            d_T += fit.F_g * fit.curve * d_mu - T * (d_r + d_scale)
-            d_width = 2.0 * T * d_T * C_bb + T**2 * d_bb
+            d_F = -((share * fit.F_g) ** 2) * g * d_g  # of log F_g
+            d_T = T * (d_F - d_r - d_scale) + fit.F_g * fit.curve * row[SD_NORMAL] * d_mu
+            d_width = 2.0 * (T * d_T + U * (d_F - d_r) + fit.F_g**2 * tau * g * d_g)
             j_c = (fit.F_K * d_K - fit.F_g * d_g) / root
             slope += fit.c * j_c + 0.5 * (1.0 - fit.c**2) / fit.width * d_width
             slope += (share * fit.F_K) ** 2 * fit.K * d_K

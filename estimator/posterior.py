@@ -38,6 +38,7 @@ from estimator.vectors import Array
 
 LARGEST_TURN = 0.3  # of one step [rad]
 LARGEST_SHIFT = 1.5  # of one step, in spreads
+NEAR = 1.0  # without a prior the axis passes the contacts' centroid within about so many spreads
 MISSED_ANYWAY = 0.2  # chance that a miss has another reason: an end, a dent, a slip
 CHART_STEP = 1e-6
 
@@ -216,7 +217,7 @@ def _location_cost(bg: Background, s: int, x: Array, derivatives: bool, work: Wo
     """
     a, u = line_of(x)
     t = along(a, -1.0, vector(bg.lines[shared(bg, s)], ORIGIN))
-    weight = 1.0 / (2.0 * spread_of(bg, s)) ** 2
+    weight = 1.0 / (NEAR * spread_of(bg, s)) ** 2
     if derivatives:
         E1, E2 = across(u)
         work.gradient[0] += weight * dot(t, E1)

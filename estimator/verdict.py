@@ -3,7 +3,8 @@
 High label probability alone never makes `determined`: every hypothesis with more than one per
 cent must be fixed by the touches in all four degrees of freedom, no labelling may leave all
 meridian planes coincident (the paper's third case, 3.8), whatever prior or magnitudes say, and the
-contacts must fit a surface of revolution at all.
+contacts must fit a surface of revolution at all. A normal gives one plane through the axis, a
+direction that is known gives another; the axis has four unknowns, and four planes always fit.
 """
 
 from __future__ import annotations
@@ -32,10 +33,11 @@ from estimator.vectors import Array, Index, Mask
 
 FREE = 0.2  # sd [rad], or [-] of the object's size, above which a motion of the axis is free
 FEIGNED = 1.5  # information that the noise of one contact feigns [1/rad^2]
-SURE = 0.95  # probability one hypothesis needs
+SURE = 0.99  # probability one hypothesis needs
 MENTIONED = 0.01  # probability from which a hypothesis matters
 MISFIT = 1e-4  # p-value of the fit below which nothing is believed of the axis
 FITS = 0.01  # p-value from which planes count as coincident
+REDUNDANT = 5  # planes that contacts must give: one more than the axis has unknowns
 MOST_GROSS = 1.0 / 3.0  # share of the contacts beyond which they are not exceptions
 DETERMINED, AMBIGUOUS, UNDETERMINED = range(3)
 
@@ -48,7 +50,7 @@ class Findings(NamedTuple):
         best: Leading peak of the likeliest hypothesis, (S,).
         probability: Of every hypothesis at its leading peak, zero elsewhere, (S, M).
         p_value: Of the fit at the best peak, (S,).
-        few, misfit, coincident, sphere, free: What was found, (S,).
+        few, blunt, misfit, coincident, sphere, free: What was found, (S,).
     """
 
     verdict: Index
@@ -56,6 +58,7 @@ class Findings(NamedTuple):
     probability: Array
     p_value: Array
     few: Mask
+    blunt: Mask
     misfit: Mask
     coincident: Mask
     sphere: Mask
@@ -75,13 +78,16 @@ def judge(readings: Readings, modes: Modes, size: Array) -> Findings:
     gross = np.mean(1.0 - modes.right[rows, best], axis=1) if n else np.zeros(S)
     misfit = (p_value < MISFIT) | (gross > MOST_GROSS)
     few = np.full(S, n < 2)
+    blunt = n + np.sum(readings[..., VOID] == 0.0, axis=1) < REDUNDANT
     coincident = planes_coincide(readings) if n > 1 else np.zeros(S, dtype=bool)
     sphere = normals_meet(readings) if n > 1 else np.zeros(S, dtype=bool)
     free = np.any((modes.probability > MENTIONED) & (_freest(modes, size, n) > FREE), axis=1)
-    undetermined = few | misfit | coincident | sphere | free
+    undetermined = few | blunt | misfit | coincident | sphere | free
     ambiguous = probability[rows, best] < SURE
     verdict = np.where(undetermined, UNDETERMINED, np.where(ambiguous, AMBIGUOUS, DETERMINED))
-    return Findings(verdict, best, probability, p_value, few, misfit, coincident, sphere, free)
+    return Findings(
+        verdict, best, probability, p_value, few, blunt, misfit, coincident, sphere, free
+    )
 
 
 def fit_p_value(chi_square: Array, freedom: Array) -> Array:

@@ -47,6 +47,11 @@ def undetermined_words(
     if findings.few[0]:
         return (f"fewer than two contacts ({n}) fix no axis",)
     reasons = _umbilic_words(readings)
+    if findings.blunt[0]:
+        reasons.append(
+            f"{n} normals and the directions of {n - int(readings[0, :, VOID].sum())} contacts leave "
+            "nothing to check the axis by; touch again, where the curvatures differ"
+        )
     if findings.misfit[0]:
         reasons.append(_misfit_words(modes, findings))
     if findings.coincident[0]:
