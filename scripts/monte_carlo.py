@@ -27,6 +27,7 @@ from pathlib import Path
 
 import numpy as np
 import tyro
+from bias_study import bias_study
 from degenerate import degenerate_study
 from fuzz import fuzz_study
 from honesty import Interval, Share
@@ -37,7 +38,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table as RichTable
 from scan import load_scan
 from scan_study import scan_study
-from studies import bias_study, efficiency_study, honesty_study
+from studies import efficiency_study, honesty_study
 from workload import Cell, Table, Workload
 
 from estimator.fusion import estimate_axes

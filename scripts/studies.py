@@ -1,8 +1,7 @@
-"""The Monte Carlo's well-posed studies: is the estimator honest, efficient, proof against bias?"""
+"""Points 2 and 3: is the estimator honest, is it efficient, where contacts fix the axis?"""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -29,9 +28,6 @@ from estimator.estimate import VERDICTS
 from estimator.sensors import SENSORS
 from sim_sensor.batch_noise import read_sets
 from sim_sensor.noise import SimulatedSensor, simulated_sensor
-
-BIAS = 1e-3  # sd of each coordinate of a finger's shift [m]
-FINGERS = ("thumb", "index", "middle", "ring")
 
 
 def honesty_study(work: Workload) -> list[Table]:
@@ -168,51 +164,3 @@ def _efficient(sensor: str, layout: tuple[int, str], errors: list[_Errors]) -> R
         "offset": ratio.offset,
         "whole": ratio.whole,
     }
-
-
-def bias_study(work: Workload) -> list[Table]:
-    """Point 4: a shift of each fingertip, told to the estimator and not told."""
-    cells = list(product(work.sensors, (3, 4, 6, 10), (3, 4), (True, False)))
-    part = work.share(len(cells) * len(FAMILIES))
-    rows = []
-    for i, (sensor, contacts, hand, told) in enumerate(cells):
-        rng = np.random.default_rng([work.seed, 4, i])
-        args = (part, sensor, contacts, FINGERS[:hand], told)
-        runs = joined([_biased_runs(*args, family, rng=rng) for family in FAMILIES])
-        rows.append(
-            {
-                "sensor": sensor,
-                "contacts": contacts,
-                "fingers": hand,
-                "bias": "modelled" if told else "not modelled",
-                "runs": len(runs.nees),
-                "determined": proportion(runs.determined),
-                "mean NEES": mean_nees(runs),
-                "covered": coverage(runs),
-                "p < 0.05": proportion(runs.p_value < 0.05),
-                "p < 1e-4": proportion(runs.p_value < 1e-4),
-            }
-        )
-    return [Table(f"Fingertips off by {1e3 * BIAS:g} mm (sd of each coordinate)", rows)]
-
-
-def _biased_runs(
-    work: Workload,
-    sensor: str,
-    contacts: int,
-    hand: tuple[str, ...],
-    told: bool,
-    family: str,
-    *,
-    rng: np.random.Generator,
-) -> Runs:
-    true = replace(SENSORS[sensor], position_bias=BIAS)
-    simulated = SimulatedSensor(true if told else SENSORS[sensor], true)
-    fingers = tuple(hand[j % len(hand)] for j in range(contacts))
-    parts = []
-    for size in work:
-        scenes = draw_scenes(family, size, contacts, rng=rng)
-        sets = read_sets(simulated, scenes.geometry, rng=rng, fingers=fingers)
-        parts.append(judged(sets, scenes, work.estimate(sets)))
-        work.progress(size)
-    return joined(parts)

@@ -21,6 +21,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 import degenerate
 import fuzz
 import fuzz_inputs
+from bias_study import BIAS
 from honesty import (
     Runs,
     beyond,
@@ -32,7 +33,7 @@ from honesty import (
     mean_nees_within,
 )
 from scenarios import FAMILIES, draw_scenes
-from studies import BIAS, against_bound
+from studies import against_bound
 from workload import Row, Table, Workload
 
 from estimator.contact import SensorNoise

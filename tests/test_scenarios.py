@@ -14,6 +14,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 import fuzz_inputs
 import honesty
 import scan
+from detectability import powers
 from scenarios import FAMILIES, RADII, draw_scenes, draw_shapes
 
 from estimator.axis import Axis, from_chart, to_chart
@@ -197,3 +198,18 @@ def test_fuzz_draws_what_a_contact_accepts(kind: str) -> None:
             contacts = sets.take(i)  # Contact checks frames and numbers
             if kind != "nearly one point":
                 require_distinct(contacts, minimum=2)
+
+
+def test_no_test_notices_a_shift_too_small_and_any_test_a_large_one() -> None:
+    scenes, rng = (
+        draw_scenes("barrel", 4, 6, rng=np.random.default_rng(8)),
+        np.random.default_rng(9),
+    )
+    finger = np.arange(6) % 3
+    small, medium, large = (
+        powers(scenes, SENSORS["gel"], finger, bias, rng=rng).mean(axis=0)
+        for bias in (1e-7, 1e-3, 1.0)
+    )
+    np.testing.assert_allclose(small, 0.05, atol=0.02)
+    np.testing.assert_allclose(large, 1.0, atol=0.02)
+    assert 0.2 < medium[0] < medium[1] < 0.9  # the likelihood ratio is the better test
