@@ -32,6 +32,7 @@ from estimator.vectors import Array, Index
 DRAMATICALLY_WORSE = 25.0  # cost above the best at which a peak no longer counts
 MOST_PEAKS = 16
 MOST_CLIMBS = 40
+ROUGH = 30  # steps before a start is compared with the others
 SAME_PEAK = 0.5  # distance in standard deviations below which two peaks are one
 SAME_AXIS = 3.0  # ... below which they are one hypothesis
 DIRECTION_VOLUME = 1.0  # information [1/rad^2] of "any direction", so that flat peaks stay finite
@@ -107,7 +108,7 @@ def _fill(
         found = 0
         for k in range(min(count, MOST_CLIMBS)):
             x = starts[order[k]]
-            cost = climb(readings, nuisances, background, s, x, 8, 1e-2, work)
+            cost = climb(readings, nuisances, background, s, x, ROUGH, 1e-2, work)
             found = _keep(background, s, x, cost, work, rough, rough_cost, found)
         sort_into(rough_cost, found, order)
         kept = 0

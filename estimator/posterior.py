@@ -38,7 +38,8 @@ from estimator.vectors import Array
 
 LARGEST_TURN = 0.3  # of one step [rad]
 LARGEST_SHIFT = 1.5  # of one step, in spreads
-NEAR = 1.0  # without a prior the axis passes the contacts' centroid within about so many spreads
+NEAR = 1.0  # without a prior the axis passes the centroid within about so many spreads
+HEAVY = 4.0  # degrees of freedom of that
 MISSED_ANYWAY = 0.2  # chance that a miss has another reason: an end, a dent, a slip
 CHART_STEP = 1e-6
 
@@ -211,20 +212,22 @@ def cost_at(
 
 @compiled
 def _location_cost(bg: Background, s: int, x: Array, derivatives: bool, work: Work) -> float:
-    """The line passes the contacts' centroid at a distance of about two spreads.
+    """The line passes the contacts' centroid at a distance of about their spread, but contacts
+    huddled on one side of a large object are not impossible: Student's t.
 
     Lines hold the foot of the origin as their point, so tilt does not change it to first order.
     """
     a, u = line_of(x)
     t = along(a, -1.0, vector(bg.lines[shared(bg, s)], ORIGIN))
-    weight = 1.0 / (NEAR * spread_of(bg, s)) ** 2
+    square = HEAVY * (NEAR * spread_of(bg, s)) ** 2
+    weight = (HEAVY + 2.0) / (square + dot(t, t))
     if derivatives:
         E1, E2 = across(u)
         work.gradient[0] += weight * dot(t, E1)
         work.gradient[1] += weight * dot(t, E2)
         work.fisher[0, 0] += weight
         work.fisher[1, 1] += weight
-    return 0.5 * weight * dot(t, t)
+    return 0.5 * (HEAVY + 2.0) * log(1.0 + dot(t, t) / square)
 
 
 @compiled

@@ -103,6 +103,8 @@ def stacked_readings(
     void = umbilicity <= UMBILIC
     if together:
         void |= _umbilic_together(umbilicity)
+    # K_tt of a void tensor may be anywhere between its curvatures
+    sd[..., 4] = np.where(void, np.hypot(sd[..., 4], half), sd[..., 4])
     kappa = np.where(void[..., None], kappa.mean(axis=-1, keepdims=True), kappa)
     read = np.nan_to_num(kappa_read, nan=0.0)
     out = np.empty((*half.shape, COLUMNS))

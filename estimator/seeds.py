@@ -9,7 +9,7 @@ from math import sqrt
 
 import numpy as np
 
-from estimator.compiled import V3, along, compiled, cross3, dot, scaled
+from estimator.compiled import V3, across, along, compiled, cross3, dot, scaled
 from estimator.likelihood import vector
 from estimator.linear import factor, solve_factored
 from estimator.posterior import shared, spread_of
@@ -110,14 +110,16 @@ def _fan(readings: Readings, background: Background, s: int, seeds: Array, count
     point = _meeting_point(readings, background, s)
     fan = min(n, FAN)
     for i in range(fan):
-        _put(seeds, count, point, vector(readings[s, i], K0))
-        _put(seeds, count + 1, point, vector(readings[s, i], K1))
-        count += 2
+        for k in (K0, K1):
+            u = vector(readings[s, i], k)
+            _put(seeds, count, _point_beside(readings, s, u, point), u)
+            count += 1
         for j in range(i):
             u = cross3(vector(readings[s, i], NORMAL), vector(readings[s, j], NORMAL))
             square = dot(u, u)
             if square > NEARLY_PARALLEL**2:
-                _put(seeds, count, point, scaled(1.0 / sqrt(square), u))
+                u = scaled(1.0 / sqrt(square), u)
+                _put(seeds, count, _point_beside(readings, s, u, point), u)
                 count += 1
     return count
 
@@ -129,14 +131,33 @@ def _put(seeds: Array, k: int, point: V3, u: V3) -> None:
 
 
 @compiled
+def _point_beside(readings: Readings, s: int, u: V3, point: V3) -> V3:
+    """Where the line along u passes the normals' lines nearest; near `point` where they do not say.
+
+    A normal's line meets the axis where (u x n) . (p - a) = 0: two unknowns across u.
+    """
+    E1, E2 = across(u)
+    g11, g12, g22, h1, h2 = 1e-3, 0.0, 1e-3, 0.0, 0.0
+    for i in range(readings.shape[1]):
+        row = readings[s, i]
+        m = cross3(u, vector(row, NORMAL))
+        gap = dot(m, along(vector(row, POSITION), -1.0, point))
+        m1, m2 = dot(m, E1), dot(m, E2)
+        g11, g12, g22 = g11 + m1 * m1, g12 + m1 * m2, g22 + m2 * m2
+        h1, h2 = h1 + m1 * gap, h2 + m2 * gap
+    det = g11 * g22 - g12 * g12
+    return along(along(point, (g22 * h1 - g12 * h2) / det, E1), (g11 * h2 - g12 * h1) / det, E2)
+
+
+@compiled
 def _meeting_point(readings: Readings, background: Background, s: int) -> V3:
     """The point that the normals' lines pass nearest; where parallel, near the contacts."""
     n = readings.shape[1]
     origin = vector(background.lines[shared(background, s)], ORIGIN)
     spread = spread_of(background, s)
-    across, pulled = np.zeros((3, 3)), np.zeros(3)
+    system, pulled = np.zeros((3, 3)), np.zeros(3)
     for j in range(3):
-        across[j, j] = n + 1e-3  # the pull keeps the point near the contacts
+        system[j, j] = n + 1e-3  # the pull keeps the point near the contacts
     for i in range(n):
         normal = vector(readings[s, i], NORMAL)
         gap = along(vector(readings[s, i], POSITION), -1.0, origin)
@@ -144,9 +165,9 @@ def _meeting_point(readings: Readings, background: Background, s: int) -> V3:
         for j in range(3):
             pulled[j] += side[j]
             for k in range(j + 1):
-                across[j, k] -= normal[j] * normal[k]
-    factor(across, across)
-    solve_factored(across, pulled)
+                system[j, k] -= normal[j] * normal[k]
+    factor(system, system)
+    solve_factored(system, pulled)
     point = (pulled[0], pulled[1], pulled[2])
     length = sqrt(dot(point, point))
     return along(origin, min(1.0, 2.0 * spread / max(length, 1e-300)), point)
