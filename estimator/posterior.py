@@ -38,7 +38,7 @@ from estimator.vectors import Array
 
 LARGEST_TURN = 0.3  # of one step [rad]
 LARGEST_SHIFT = 1.5  # of one step, in spreads
-NEAR = 1.0  # without a prior the axis passes the centroid within about so many spreads
+NEAR = 0.5  # without a prior the axis passes the centroid within about so many spreads
 HEAVY = 4.0  # degrees of freedom of that
 MISSED_ANYWAY = 0.2  # chance that a miss has another reason: an end, a dent, a slip
 CHART_STEP = 1e-6
