@@ -29,9 +29,12 @@ from estimator.readings import VOID, Readings
 from estimator.seeds import complex_lines, most_seeds, seed_lines
 from estimator.vectors import Array, Index
 
-DRAMATICALLY_WORSE = 25.0  # cost above the best at which a peak no longer counts
+DRAMATICALLY_WORSE = 16.0  # cost above the best at which a peak no longer counts
 MOST_PEAKS = 16
-MOST_CLIMBS = 40
+MOST_STARTS = 24  # seeds from which a few steps are taken
+FIRST_STEPS = 3
+HOPELESS = 0.05  # of what a climb lags behind the best: gaining less than this in a step, it rests
+MOST_CLIMBS = 6  # of these, the ones that are followed to rest
 ROUGH = 30  # steps before a start is compared with the others
 SAME_PEAK = 0.5  # distance in standard deviations below which two peaks are one
 SAME_AXIS = 3.0  # ... below which they are one hypothesis
@@ -102,11 +105,13 @@ def _fill(
     for s in range(readings.shape[0]):
         count = seed_lines(readings, background, extra, s, seeds)
         _start(readings, nuisances, background, s, seeds, count, starts, costs, work)
-        sort_into(costs, count, order)
-        found = 0
+        count = _first_steps(readings, nuisances, background, s, starts, costs, count, order, work)
+        found, least = 0, costs[order[0]]
         for k in range(min(count, MOST_CLIMBS)):
             x = starts[order[k]]
-            cost = climb(readings, nuisances, background, s, x, ROUGH, 1e-2, work)
+            rest = max(1e-2, HOPELESS * (costs[order[k]] - least))
+            cost = climb(readings, nuisances, background, s, x, ROUGH, rest, work)
+            least = min(least, cost)
             found = _keep(background, s, x, cost, work, rough, rough_cost, found)
         sort_into(rough_cost, found, order)
         kept = 0
@@ -117,6 +122,30 @@ def _fill(
                 kept = _keep(background, s, x, cost, work, modes.x[s], modes.cost[s], kept)
         modes.peaks[s] = kept
         _describe(readings, nuisances, background, s, modes, order, costs, work)
+
+
+@compiled
+def _first_steps(
+    readings: Readings,
+    nuisances: Nuisances,
+    background: Background,
+    s: int,
+    starts: Array,
+    costs: Array,
+    count: int,
+    order: Index,
+    work: Work,
+) -> int:
+    """A few steps from the cheapest seeds; `order` then has those worth the whole climb first."""
+    sort_into(costs, count, order)
+    for k in range(min(count, MOST_STARTS)):
+        x = starts[order[k]]
+        cost = climb(readings, nuisances, background, s, x, FIRST_STEPS, 1e-2, work)
+        costs[order[k]] = cost if np.isfinite(cost) else 1e300
+    for k in range(MOST_STARTS, count):
+        costs[order[k]] = 1e300
+    sort_into(costs, count, order)
+    return min(count, MOST_STARTS)
 
 
 @compiled
@@ -312,7 +341,7 @@ def _parallel_row(
     delta, _, bias = states_of(nuisances, i, x)
     seen = seen_from(readings[s, i], a, u, bias, delta)
     E1, E2 = across(u)
-    fill_motions(seen, E1, E2, work.rows)
+    fill_motions(seen, E1, E2, work.rows, LOCAL)
     total = 0.0
     for j in range(LOCAL):
         J = place(nuisances, i, j)

@@ -49,6 +49,8 @@ class Work(NamedTuple):
 
     gradient: Array  # (P,)
     fisher: Array  # (P, P), lower triangle
+    kept_gradient: Array  # (P,)
+    kept_fisher: Array  # (P, P)
     local_gradient: Array  # (9,)
     local_fisher: Array  # (9, 9)
     rows: Array  # (8, 9)
@@ -62,6 +64,8 @@ class Work(NamedTuple):
 @compiled
 def work_space(parameters: int, contacts: int) -> Work:
     return Work(
+        np.zeros(parameters),
+        np.zeros((parameters, parameters)),
         np.zeros(parameters),
         np.zeros((parameters, parameters)),
         np.zeros(LOCAL),
@@ -147,7 +151,7 @@ def contacts_cost(
         work.tally[3] += 1.0 + readable
         work.right[i] = trust
         if derivatives:
-            fill_motions(seen, basis[0], basis[1], work.rows)
+            fill_motions(seen, basis[0], basis[1], work.rows, locals_)
             fill_derivatives(
                 row, seen, fit, trust, normal_only,
                 work.local_gradient, work.local_fisher, work.rows, locals_,
@@ -395,6 +399,20 @@ def solve_lifted(work: Work, damping: float, spread: float) -> None:
 
 
 @compiled
+def _remember(work: Work) -> None:
+    copied(work.gradient, work.kept_gradient)
+    for j in range(len(work.fisher)):
+        copied(work.fisher[j], work.kept_fisher[j])
+
+
+@compiled
+def _recall(work: Work) -> None:
+    copied(work.kept_gradient, work.gradient)
+    for j in range(len(work.fisher)):
+        copied(work.kept_fisher[j], work.fisher[j])
+
+
+@compiled
 def climb(
     readings: Readings,
     nuisances: Nuisances,
@@ -416,15 +434,17 @@ def climb(
     for _ in range(iterations):
         solve_lifted(work, damping, spread)
         move(background, s, x, work.step, trial)
-        found = cost_at(readings, nuisances, background, s, trial, False, work)
+        _remember(work)
+        found = cost_at(readings, nuisances, background, s, trial, True, work)
         gain = cost - found
         if gain > 0.0:
             copied(trial, x)
-            cost = cost_at(readings, nuisances, background, s, x, True, work)
+            cost = found
             damping = max(0.2 * damping, 1e-9)
             if gain < gain_at_rest:
                 break
         else:
+            _recall(work)
             damping *= 8.0
             if damping > 1e7 or gain > -1e-13:
                 break

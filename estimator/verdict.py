@@ -9,11 +9,14 @@ direction that is known gives another; the axis has four unknowns, and four plan
 
 from __future__ import annotations
 
+from math import cos, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
 from scipy.special import chdtrc
 
+from estimator.compiled import V3, along, compiled, dot, scaled
+from estimator.likelihood import vector
 from estimator.modes import Modes
 from estimator.readings import (
     EDGE,
@@ -30,7 +33,7 @@ from estimator.readings import (
     VOID,
     Readings,
 )
-from estimator.vectors import Array, Index, Mask
+from estimator.vectors import Array, Index, Mask, frozen
 
 FREE = 0.2  # sd [rad], or [-] of the object's size, above which a motion of the axis is free
 FEIGNED = 1.5  # information that the noise of one contact feigns [1/rad^2]
@@ -39,7 +42,7 @@ MENTIONED = 0.01  # probability from which a hypothesis matters
 MISFIT = 1e-4  # p-value of the fit below which nothing is believed of the axis
 FITS = 1e-4  # p-value from which planes count as coincident, normals as parallel or concurrent
 PIERCED = 10.0  # position errors from a contact within which an axis may not pass
-LIKELY_TURNS = tuple(np.linspace(-2.4, 2.4, 13))  # of a sensor's directions, in its own sd
+LIKELY_TURNS = frozen(0.4 * np.arange(-6, 7))  # of a sensor's directions, in its own sd
 REDUNDANT = 5  # planes that contacts must give: one more than the axis has unknowns
 MOST_GROSS = 1.0 / 3.0  # share of the contacts beyond which they are not exceptions
 DETERMINED, AMBIGUOUS, UNDETERMINED = range(3)
@@ -147,46 +150,76 @@ def planes_coincide(readings: Readings) -> Mask:
 
     A rotation common to the directions of a sensor may hide it, so all likely ones are tried.
     """
-    known = np.any(readings[..., VOID] == 0.0, axis=1)
-    common = readings[..., SD_COMMON].max(axis=1)
-    tried = LIKELY_TURNS if np.any(common > 0.0) else (0.0,)
+    known = np.sum(readings[..., VOID] == 0.0, axis=1)
     statistic = np.full(len(readings), np.inf)
-    for turn in tried:
-        for first in (0, 1):
-            found = _one_plane(readings, first, turn * common) + turn**2
-            statistic = np.minimum(statistic, found)
-    freedom = 2.0 * readings.shape[1] + np.sum(readings[..., VOID] == 0.0, axis=1) - 3.0
-    return np.asarray(known & (chdtrc(np.maximum(freedom, 1.0), statistic) > FITS))
+    _fill_one_plane(readings, LIKELY_TURNS, statistic)
+    freedom = 2.0 * readings.shape[1] + known - 3.0
+    return np.asarray((known > 0) & (chdtrc(np.maximum(freedom, 1.0), statistic) > FITS))
 
 
-def _one_plane(readings: Readings, first: int, turn: Array) -> Array:
-    """Chi-square of one common plane, where row `first` of the first known contact is across it.
+@compiled
+def _fill_one_plane(readings: Readings, turns: Array, statistic: Array) -> None:
+    n = readings.shape[1]
+    for s in range(readings.shape[0]):
+        common, first = 0.0, -1
+        for i in range(n - 1, -1, -1):
+            common = max(common, readings[s, i, SD_COMMON])
+            first = i if readings[s, i, VOID] == 0.0 else first
+        for turn in turns:
+            if first >= 0 and (common > 0.0 or turn == 0.0):
+                for row in range(2):
+                    found = _one_plane(readings, s, first, row, turn * common) + turn**2
+                    statistic[s] = min(statistic[s], found)
+
+
+@compiled
+def _one_plane(readings: Readings, s: int, first: int, row: int, turn: float) -> float:
+    """Chi-square of one common plane, where `row` of contact `first` is across it.
 
     A known direction must be across the plane (two numbers), of a void one the normal must be
-    along it, and all contacts must lie in it.
+    along it, and all contacts must lie in it. The plane's normal is the mean of the directions.
     """
-    S, n = readings.shape[:2]
-    known = readings[..., VOID] == 0.0
-    c, s = np.cos(turn)[:, None, None], np.sin(turn)[:, None, None]
-    k0, k1 = readings[..., K0:K1], readings[..., K1:KAPPA]
-    N = np.stack([c * k0 - s * k1, c * k1 + s * k0], axis=2)  # the planes' normals, turned back
-    reference = N[np.arange(S), np.argmax(known, axis=1), first]
-    row = np.argmax(np.abs(np.einsum("snlx,sx->snl", N, reference)), axis=2)
-    chosen = np.take_along_axis(N, row[..., None, None], axis=2)[:, :, 0] * known[..., None]
-    mean = np.linalg.eigh(np.einsum("snx,sny->sxy", chosen, chosen))[1][..., -1]
-    sine = 1.0 - np.einsum("snx,sx->sn", chosen, mean) ** 2
-    D = 0.5 * np.abs(readings[..., KAPPA] - readings[..., KAPPA + 1])
-    var_n = readings[..., SD_NORMAL] ** 2
-    var_turn = (readings[..., SD_K_TZ] / np.maximum(2.0 * D, 1e-9)) ** 2
-    var_turn = var_turn + readings[..., SD_DIRECTION] ** 2 + var_n
-    lean = np.einsum("snx,sx->sn", readings[..., NORMAL:K0], mean) ** 2
-    turned = np.where(known, np.maximum(sine, 0.0) / var_turn, lean / var_n)
-    p = readings[..., POSITION:NORMAL]
-    centred = p - p.mean(axis=1, keepdims=True)
-    share = np.where(known, var_turn, var_n) / n
-    var_gap = readings[..., SD_POSITION] ** 2 + np.sum(centred**2, axis=2) * share
-    gap = np.einsum("snx,sx->sn", centred, mean) ** 2
-    return np.asarray(np.sum(turned + gap / var_gap, axis=1))
+    n = readings.shape[1]
+    reference = _turned(readings[s, first], row, turn)
+    mean, centre = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for i in range(n):
+        contact = readings[s, i]
+        centre = along(centre, 1.0 / n, vector(contact, POSITION))
+        if contact[VOID] == 0.0:
+            across = _nearest(contact, reference, turn)
+            mean = along(mean, 1.0 if dot(across, reference) > 0.0 else -1.0, across)
+    mean = scaled(1.0 / sqrt(dot(mean, mean)), mean)
+    total = 0.0
+    for i in range(n):
+        contact = readings[s, i]
+        var_n, var_p = contact[SD_NORMAL] ** 2, contact[SD_POSITION] ** 2
+        spread = max(abs(contact[KAPPA] - contact[KAPPA + 1]), 1e-9)
+        var_turn = (contact[SD_K_TZ] / spread) ** 2 + contact[SD_DIRECTION] ** 2 + var_n
+        away = along(vector(contact, POSITION), -1.0, centre)
+        if contact[VOID] == 0.0:
+            cosine = dot(_nearest(contact, reference, turn), mean)
+            total += max(1.0 - cosine**2, 0.0) / var_turn
+        else:
+            total += dot(vector(contact, NORMAL), mean) ** 2 / var_n
+            var_turn = var_n
+        total += dot(away, mean) ** 2 / (var_p + dot(away, away) * var_turn / n)
+    return total
+
+
+@compiled
+def _turned(contact: Array, row: int, turn: float) -> V3:
+    """A measured direction, turned back about the normal."""
+    k0, k1 = vector(contact, K0), vector(contact, K1)
+    if row == 0:
+        return along(scaled(cos(turn), k0), -sin(turn), k1)
+    return along(scaled(cos(turn), k1), sin(turn), k0)
+
+
+@compiled
+def _nearest(contact: Array, reference: V3, turn: float) -> V3:
+    """The one of its two directions that is nearer to the reference."""
+    first, second = _turned(contact, 0, turn), _turned(contact, 1, turn)
+    return first if abs(dot(first, reference)) >= abs(dot(second, reference)) else second
 
 
 def meeting_point(readings: Readings) -> tuple[Array, Array]:
