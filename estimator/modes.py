@@ -34,7 +34,6 @@ MOST_PEAKS = 16
 MOST_STARTS = 24  # seeds from which a few steps are taken
 FIRST_STEPS = 3
 HOPELESS = 0.05  # of what a climb lags behind the best: gaining less than this in a step, it rests
-MOST_CLIMBS = 6  # of these, the ones that are followed to rest
 ROUGH = 30  # steps before a start is compared with the others
 SAME_PEAK = 0.5  # distance in standard deviations below which two peaks are one
 SAME_AXIS = 3.0  # ... below which they are one hypothesis
@@ -107,8 +106,10 @@ def _fill(
         _start(readings, nuisances, background, s, seeds, count, starts, costs, work)
         count = _first_steps(readings, nuisances, background, s, starts, costs, count, order, work)
         found, least = 0, costs[order[0]]
-        for k in range(min(count, MOST_CLIMBS)):
+        for k in range(count):
             x = starts[order[k]]
+            if _on_the_way(readings, nuisances, background, s, x, rough, found, work):
+                continue
             rest = max(1e-2, HOPELESS * (costs[order[k]] - least))
             cost = climb(readings, nuisances, background, s, x, ROUGH, rest, work)
             least = min(least, cost)
@@ -122,6 +123,26 @@ def _fill(
                 kept = _keep(background, s, x, cost, work, modes.x[s], modes.cost[s], kept)
         modes.peaks[s] = kept
         _describe(readings, nuisances, background, s, modes, order, costs, work)
+
+
+@compiled
+def _on_the_way(
+    readings: Readings,
+    nuisances: Nuisances,
+    background: Background,
+    s: int,
+    x: Array,
+    kept: Array,
+    count: int,
+    work: Work,
+) -> bool:
+    """Whether a start has come so near to a peak already found that it would end there too."""
+    cost_at(readings, nuisances, background, s, x, True, work)
+    information = marginal(work.fisher)
+    for k in range(count):
+        if separation(background, s, x, kept[k], information) < SAME_AXIS**2:
+            return True
+    return False
 
 
 @compiled
