@@ -51,8 +51,8 @@ class Modes(NamedTuple):
         contacts: Information of the line from the contacts alone, nuisances out, (S, M, 4, 4).
         parallel_rows: Probability that row 0 of each contact is the parallel's, (S, M, n).
         right: Probability that each contact is no gross error, (S, M, n).
-        chi_square, freedom: Sum of squares of the contacts' residuals, and how many there are
-            beyond the four of the line, gross errors left out, (S, M).
+        tally: Sum of squares of the contacts' residuals and how many there are beyond the four
+            of the line; gross errors left out, and all of them, (S, M, 4).
         leader: First peak of the same hypothesis, (S, M).
     """
 
@@ -64,8 +64,7 @@ class Modes(NamedTuple):
     contacts: Array
     parallel_rows: Array
     right: Array
-    chi_square: Array
-    freedom: Array
+    tally: Array
     leader: Index
 
 
@@ -83,8 +82,7 @@ def find_modes(readings: Readings, nuisances: Nuisances, background: Background)
         np.zeros((S, M, 4, 4)),
         np.zeros((S, M, n)),
         np.zeros((S, M, n)),
-        np.zeros((S, M)),
-        np.zeros((S, M)),
+        np.zeros((S, M, 4)),
         np.zeros((S, M), dtype=np.intp),
     )
     _fill(readings, nuisances, background, complex_lines(readings), modes)
@@ -258,12 +256,12 @@ def _contacts_alone(
     for j in range(P):
         for m in range(P):
             work.fisher[j, m] = nuisances.precision[j - 4] if j == m and j > 3 else 0.0
-    _, chi_square, freedom = contacts_cost(
-        readings, nuisances, background, s, modes.x[s, k], True, work
-    )
+    contacts_cost(readings, nuisances, background, s, modes.x[s, k], True, work)
+    prior = 0.0
     for j in range(len(nuisances.precision)):
-        chi_square += nuisances.precision[j] * modes.x[s, k, 6 + j] ** 2
-    modes.chi_square[s, k], modes.freedom[s, k] = chi_square, freedom - 4.0
+        prior += nuisances.precision[j] * modes.x[s, k, 6 + j] ** 2
+    for j in range(4):
+        modes.tally[s, k, j] = work.tally[j] + (prior if j % 2 == 0 else -4.0)
     for i in range(readings.shape[1]):
         modes.right[s, k, i] = work.right[i]
     information = marginal(work.fisher)
@@ -287,8 +285,8 @@ def _reorder(modes: Modes, s: int, order: Index) -> None:
             for row in range(4):
                 _swap(modes.contacts[s, k, row], modes.contacts[s, j, row])
             _swap(modes.right[s, k], modes.right[s, j])
-            for value in (modes.cost, modes.chi_square, modes.freedom):
-                value[s, k], value[s, j] = value[s, j], value[s, k]
+            _swap(modes.tally[s, k], modes.tally[s, j])
+            modes.cost[s, k], modes.cost[s, j] = modes.cost[s, j], modes.cost[s, k]
 
 
 @compiled
