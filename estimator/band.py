@@ -1,8 +1,9 @@
 """A profile that is only partly known: a Gaussian over splines, and what touches tell it.
 
-The profile is the natural cubic spline through nodes at fixed heights; the node radii have a mean
-and a covariance. Radius and slope at any height are linear in the nodes, so a touch conditions
-the band exactly (linear Gaussian), and the posterior has the prior's type.
+The profile is the natural cubic spline through nodes at fixed heights, straight beyond them; the
+node radii have a mean and a covariance. Radius, slope and second derivative at any height are
+linear in the nodes, so touches condition the band exactly (linear Gaussian), and the posterior has
+the prior's type.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from estimator.profile import SplineProfile
+from estimator.profile_readings import ProfileReadings
 from estimator.vectors import Array, frozen
 
 SLOPE_SD = 0.15  # of the profile as a whole [-]
@@ -39,19 +41,18 @@ class ProfileBand:
         """Standard deviation of the radius at the nodes [m]."""
         return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 0.0)))
 
-    def conditioned(
-        self, z: Array, r: Array, dr: Array, *, r_sd: Array, dr_sd: Array
-    ) -> ProfileBand:
-        """The band after radii r [m] and slopes dr [-] were found at heights z [m], all (m,).
+    def radius(self, z: Array) -> tuple[Array, Array]:
+        """Mean and standard deviation of the radius at heights z (m,) [m]."""
+        H = self._rows(z)[0]
+        variance = np.einsum("ij,jk,ik->i", H, self.covariance, H)
+        return H @ self.mean, np.sqrt(np.maximum(variance, 0.0))
 
-        Heights outside the nodes count at the nearest end.
-        """
-        spline = CubicSpline(self.z, np.eye(len(self.z)), bc_type="natural")
-        z = np.clip(z, self.z[0], self.z[-1])
-        H = np.vstack([spline(z), spline(z, 1)])
-        noise = np.diag(np.concatenate([r_sd, dr_sd]) ** 2)
-        gain = np.linalg.solve(H @ self.covariance @ H.T + noise, H @ self.covariance).T
-        mean = self.mean + gain @ (np.concatenate([r, dr]) - H @ self.mean)
+    def conditioned(self, told: ProfileReadings) -> ProfileBand:
+        """The band after radii, slopes and second derivatives were read at some heights."""
+        H = np.vstack(self._rows(told.z))
+        read = np.concatenate([told.r, told.dr, told.ddr])
+        gain = np.linalg.solve(H @ self.covariance @ H.T + told.covariance, H @ self.covariance).T
+        mean = self.mean + gain @ (read - H @ self.mean)
         covariance = self.covariance - gain @ H @ self.covariance
         return ProfileBand(self.z, frozen(mean), frozen(0.5 * (covariance + covariance.T)))
 
@@ -59,6 +60,13 @@ class ProfileBand:
         """Node radii drawn from the band, kept above a fifth of the mean, (count, k) [m]."""
         drawn = rng.multivariate_normal(self.mean, self.covariance, size=count, method="eigh")
         return np.maximum(drawn, 0.2 * np.max(self.mean))
+
+    def _rows(self, z: Array) -> tuple[Array, Array, Array]:
+        """r, r' and r'' at heights z (m,) as linear maps of the node radii, each (m, k)."""
+        spline = CubicSpline(self.z, np.eye(len(self.z)), bc_type="natural")
+        inside = np.clip(z, self.z[0], self.z[-1])
+        slope = spline(inside, 1)
+        return spline(inside) + (z - inside)[:, None] * slope, slope, spline(inside, 2)
 
 
 def coarse_band(radius: float, radius_sd: float, z_range: tuple[float, float]) -> ProfileBand:

@@ -13,11 +13,11 @@ from estimator.contact import Contact, Miss
 from estimator.estimate import AxisEstimate, Hypothesis
 from estimator.fusion import estimate_axis
 from estimator.prior import AxisPrior
+from estimator.profile_readings import profile_readings
 from estimator.surface import SurfaceOfRevolution
-from estimator.vectors import Array, frozen, unit
+from estimator.vectors import Array, frozen
 
 SURE_HEIGHT = 0.7  # of the believed half height: beyond it a miss may have passed an end
-WALL = 0.3  # n . rad from which a contact tells radius and slope: r' up to about 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,8 @@ class Belief:
         prior: What was believed before any touch, e.g. by a camera.
         prior_band: The profile believed then; every update conditions it anew.
         hypotheses: Axes with covariance and probability, likeliest first.
-        band: The profile about the likeliest axis, z = 0 at that axis' point.
+        band: The profile about the likeliest axis, z = 0 at that axis' point, also where several
+            axes remain. Its spread allows for that axis' own covariance.
         contacts, misses: Every touch so far; the estimate always rests on all of them.
         estimate: What the estimator said of them, None before the first touch.
     """
@@ -93,7 +94,7 @@ def update(belief: Belief, touches: Iterable[Contact | Miss]) -> Belief:
     beside = tuple(miss for miss in misses if _beside_wall(miss, belief))
     estimate = estimate_axis(contacts, prior=belief.prior, misses=beside)
     hypotheses = tuple(_with_sense(h, belief.prior.axis) for h in estimate.hypotheses)
-    band = _touched_band(belief.prior_band, hypotheses[0], contacts)
+    band = _touched_band(belief.prior_band, estimate, hypotheses[0], contacts)
     return replace(
         belief,
         hypotheses=hypotheses,
@@ -131,36 +132,24 @@ def _with_sense(hypothesis: Hypothesis, reference: Axis) -> Hypothesis:
 
 
 def _touched_band(
-    band: ProfileBand, hypothesis: Hypothesis, contacts: tuple[Contact, ...]
+    band: ProfileBand, estimate: AxisEstimate, hypothesis: Hypothesis, contacts: tuple[Contact, ...]
 ) -> ProfileBand:
-    """Radius and slope of every contact about the likeliest axis, eqs (1), (2)."""
-    axis = hypothesis.axis
-    contacts = tuple(c for c in contacts if _on_wall(c, axis))
-    if not contacts:
-        return band
-    p = np.array([c.position for c in contacts])
-    n = np.array([c.normal for c in contacts])
-    z = (p - axis.point) @ axis.direction
-    away = p - axis.foot(p)
-    r = np.linalg.norm(away, axis=1)
-    rad = away / r[:, None]
-    dr = -(n @ axis.direction) / np.sum(n * rad, axis=1)  # (2): n ~ rad - r' u
-    sd = np.sqrt(np.diag(hypothesis.covariance))
-    noise = [c.noise for c in contacts]
-    r_sd = np.hypot([s.position for s in noise], np.hypot(sd[0], sd[1]))
-    dr_sd = (1.0 + dr**2) * np.hypot([s.normal for s in noise], np.hypot(sd[2], sd[3]))
-    return band.conditioned(z, r, dr, r_sd=r_sd, dr_sd=dr_sd)
+    """The band about the likeliest axis; a contact that is grossly wrong tells nothing of it."""
+    right = np.nonzero(estimate.gross_errors < 0.5)[0]
+    kept = replace(hypothesis, parallel_rows=frozen(hypothesis.parallel_rows[right]))
+    return band.conditioned(
+        profile_readings([contacts[i] for i in right], kept, estimate.nuisances)
+    )
 
 
 def _beside_wall(miss: Miss, belief: Belief) -> bool:
-    """Whether a finger that met nothing was at a height where the believed object surely is."""
+    """Whether a finger that met nothing was at a height where the believed object surely is.
+
+    A tilt of the axis changes the height, but never to more than the distance from the middle.
+    """
     low, high = belief.prior_band.z[0], belief.prior_band.z[-1]
     axis = belief.prior.axis
-    height = (miss.tip - axis.point) @ axis.direction
-    return bool(abs(height - 0.5 * (low + high)) < SURE_HEIGHT * 0.5 * (high - low))
-
-
-def _on_wall(contact: Contact, axis: Axis) -> bool:
-    """Whether the normal looks away from the axis; on a flat end it looks along it."""
-    rad = unit(contact.position - axis.foot(contact.position))
-    return float(contact.normal @ rad) > WALL
+    q = miss.tip - axis.point - 0.5 * (low + high) * axis.direction
+    tilt_sd = np.sqrt(np.linalg.eigvalsh(belief.prior.covariance[2:, 2:])[-1])
+    height = abs(q @ axis.direction) + tilt_sd * np.linalg.norm(np.cross(q, axis.direction))
+    return bool(min(height, np.linalg.norm(q)) < SURE_HEIGHT * 0.5 * (high - low))

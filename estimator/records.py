@@ -3,12 +3,30 @@
 Contacts in:
 
     {"unit": "m" | "mm" | "in",
-     "contacts": [{"position": [3], "normal": [3], "directions": [[3], [3]], "curvatures": [2]}]}
+     "contacts": [{"position": [3], "normal": [3], "directions": [[3], [3]], "curvatures": [2],
+                   "finger": "thumb", "sensor": "gel 1"}]}
 
 Positions in the unit, curvatures per unit; a curvature is null where it saturated, flatter than
 the sensor resolves; both are null on a flat end, whose directions then say nothing. Where
-curvatures were not measured at all, only their directions, "curvatures" itself is null. Other keys
-are left alone.
+curvatures were not measured at all, only their directions, "curvatures" itself is null. "finger"
+and "sensor" may be left out: they name whose tip touched and with what, for contacts of one finger
+share its position bias, contacts of one sensor its direction and scale offset. Other keys are left
+alone.
+
+Estimates out, [m] and [rad]:
+
+    {"axis": {"point": [3], "direction": [3]}, "covariance": [[4] x 4], "chart": what it is of,
+     "labellings": [{"parallel_rows": [n], "probability"}],
+     "hypotheses": [{"axis", "covariance", "probability", "direction_offset"}],
+     "verdict": "determined" | "ambiguous" | "undetermined", "reasons": [text], "p_value",
+     "free_motions": [{"pivot": [3], "shift": [3], "tilt": [3]}],
+     "nuisances": [{"name", "owner", "mean": [1 or 3], "sd": [1 or 3]}],
+     "gross_errors": [n]}
+
+Free motions are what the touches leave open of the likeliest axis: one standard deviation, a shift
+[m] and a rotation vector about the pivot [rad]. Nuisances are what was found of the sensor or
+finger that is the owner: "direction_offset" [rad], "scale_offset", the log of measured over true
+radius, and "position_bias" [m]. Gross errors are the probabilities that a contact is grossly wrong.
 """
 
 from __future__ import annotations
@@ -22,7 +40,7 @@ from typing import Any
 import numpy as np
 
 from estimator.contact import Contact, SensorNoise, measured_contact, require_distinct
-from estimator.estimate import AxisEstimate, Hypothesis
+from estimator.estimate import AxisEstimate, FreeMotion, Hypothesis, Nuisance
 
 UNITS = {"m": 1.0, "mm": 1e-3, "in": 0.0254}
 FIELDS = ("position", "normal", "directions", "curvatures")
@@ -94,7 +112,15 @@ def _contact(entry: Any, metres: float, noise: SensorNoise) -> Contact:
         raise ValueError(f"position: expected within {LARGEST['position']:g} m of the origin")
     normal = _numbers("normal", entry["normal"], (3,))
     directions = _numbers("directions", entry["directions"], (2, 3))
-    return measured_contact(position, normal, directions, curvatures, noise)
+    contact = measured_contact(position, normal, directions, curvatures, noise)
+    return replace(contact, finger=_name("finger", entry), sensor=_name("sensor", entry))
+
+
+def _name(field: str, entry: Mapping[str, Any]) -> str:
+    name = entry.get(field, "")
+    if not isinstance(name, str):
+        raise ValueError(f"{field}: expected a name, got {name!r}")
+    return name
 
 
 def _numbers(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray[Any, Any]:
@@ -120,7 +146,7 @@ def _is_curvature(x: Any) -> bool:
 
 
 def estimate_record(estimate: AxisEstimate) -> dict[str, Any]:
-    """An estimate as JSON: SI, radians; the covariance's chart is named in it."""
+    """An estimate as JSON, its fields as above."""
     return {
         "axis": axis_record(estimate.best),
         "covariance": estimate.covariance.tolist(),
@@ -144,6 +170,9 @@ def estimate_record(estimate: AxisEstimate) -> dict[str, Any]:
         "verdict": estimate.verdict,
         "reasons": list(estimate.reasons),
         "p_value": estimate.p_value,
+        "free_motions": [_motion_record(motion) for motion in estimate.free_motions],
+        "nuisances": [_nuisance_record(nuisance) for nuisance in estimate.nuisances],
+        "gross_errors": estimate.gross_errors.tolist(),
     }
 
 
@@ -151,3 +180,28 @@ def axis_record(hypothesis: Hypothesis) -> dict[str, list[float]]:
     """Point and direction of an axis as lists."""
     axis = hypothesis.axis
     return {"point": axis.point.tolist(), "direction": axis.direction.tolist()}
+
+
+def contact_record(contact: Contact) -> dict[str, Any]:
+    """A contact as `contacts_from_record` reads it back, with the unit "m"."""
+    return {
+        "position": contact.position.tolist(),
+        "normal": contact.normal.tolist(),
+        "directions": contact.directions.tolist(),
+        "curvatures": [None if np.isnan(k) else float(k) for k in contact.curvatures],
+        "finger": contact.finger,
+        "sensor": contact.sensor,
+    }
+
+
+def _motion_record(motion: FreeMotion) -> dict[str, list[float]]:
+    return {name: getattr(motion, name).tolist() for name in ("pivot", "shift", "tilt")}
+
+
+def _nuisance_record(nuisance: Nuisance) -> dict[str, Any]:
+    return {
+        "name": nuisance.name,
+        "owner": nuisance.owner,
+        "mean": nuisance.mean.tolist(),
+        "sd": nuisance.sd.tolist(),
+    }

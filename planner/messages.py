@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from estimator.contact import Contact, Miss
-from estimator.records import axis_record, estimate_record
+from estimator.records import axis_record, contact_record, estimate_record
 from hand_models.hand import Hand
 from planner.explore import Step
 from planner.plan import Plan, Probe
@@ -94,15 +94,7 @@ def outcome_record(finger: str, outcome: Contact | Miss) -> dict[str, Any]:
     """A contact as it was read, or a miss."""
     if isinstance(outcome, Miss):
         return {"finger": finger, "miss": {"tip": outcome.tip.tolist(), "radius": outcome.radius}}
-    return {
-        "finger": finger,
-        "contact": {
-            "position": outcome.position.tolist(),
-            "normal": outcome.normal.tolist(),
-            "directions": outcome.directions.tolist(),
-            "curvatures": [_finite(float(k)) for k in outcome.curvatures],
-        },
-    }
+    return {"finger": finger, "contact": contact_record(outcome)}
 
 
 def pose_record(X: pin.SE3) -> dict[str, list[float]]:

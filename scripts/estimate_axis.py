@@ -6,9 +6,11 @@ along with the axis, and reported with its probability.
 
     {"unit": "m" | "mm" | "in",
      "contacts": [{"position": [x, y, z], "normal": [x, y, z],
-                   "directions": [[x, y, z], [x, y, z]], "curvatures": [k1, k2]}, ...]}
+                   "directions": [[x, y, z], [x, y, z]], "curvatures": [k1, k2],
+                   "finger": "thumb", "sensor": "gel 1"}, ...]}
 
-Curvatures are per unit, null where the sensor saturated (flatter than it resolves).
+Curvatures are per unit, null where the sensor saturated (flatter than it resolves). Finger and
+sensor may be left out; contacts that name the same one share its errors, which are estimated along.
 
 Example: python scripts/estimate_axis.py tests/data/table8.json
 """
@@ -17,7 +19,7 @@ from __future__ import annotations
 
 import json
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -26,10 +28,19 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
+from estimator.assumptions import Assumptions
+from estimator.contact import SensorNoise
 from estimator.estimate import AxisEstimate
 from estimator.fusion import estimate_axis
 from estimator.records import estimate_record, read_contacts
 from estimator.sensors import sensor_noise
+
+SUSPECT = 0.5  # probability of a gross error that is worth a word
+SHARED = {  # what a nuisance is called, its unit in SI, digits
+    "direction_offset": ("rotation of the directions, deg", 180.0 / np.pi, 1),
+    "scale_offset": ("radii read too large by, %", 100.0, 1),
+    "position_bias": ("shift of the positions (x y z), mm", 1e3, 2),
+}
 
 
 @dataclass(frozen=True)
@@ -41,6 +52,19 @@ class Options:
     sensor: str = "robotworld"
     """What the sensor is worth: ideal, fearing1988, robotworld, taxel, gel, gel-good, gel-poor.
     The default is the most cautious: directions share an offset of about ten degrees."""
+    direction_offset_deg: float | None = None
+    """How far all directions of one sensor may be rotated alike; 0: not at all. Default: as the
+    sensor says."""
+    scale_offset_percent: float | None = None
+    """By how much all radii of one sensor may be wrong alike; 0: not at all. Default: as the
+    sensor says."""
+    position_bias_mm: float | None = None
+    """How far all positions of one finger may be shifted alike; 0: not at all. Default: as the
+    sensor says."""
+    gross_error: float = Assumptions().gross_error
+    """Probability that a contact is grossly wrong, from five contacts up; 0 trusts them all."""
+    slope_deg: float | None = None
+    """Standard deviation of the profile's slope, for gently tapered objects. Default: any slope."""
     only: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N")] = ()
     """Use only these contacts, counted from 1."""
     json: bool = False
@@ -50,33 +74,89 @@ class Options:
 def main() -> int:
     options = tyro.cli(Options, description=__doc__)
     try:
-        contacts = read_contacts(options.file, sensor_noise(options.sensor))
+        contacts = read_contacts(options.file, _noise(options))
         wrong = [n for n in options.only if not 1 <= n <= len(contacts)]
         if wrong:
             raise ValueError(f"--only {wrong[0]}: the file holds contacts 1 to {len(contacts)}")
         chosen = [contacts[n - 1] for n in dict.fromkeys(options.only)] or contacts
-        estimate = estimate_axis(chosen)
+        estimate = estimate_axis(chosen, assumptions=_assumptions(options))
     except ValueError as error:
         print(f"estimate_axis: {error}", file=sys.stderr)
         return 2
     if options.json:
         print(json.dumps(estimate_record(estimate), indent=2))
     else:
-        _print(estimate, len(chosen))
+        numbers = list(dict.fromkeys(options.only)) or list(range(1, len(contacts) + 1))
+        _print(estimate, numbers)
     return 0
 
 
-def _print(estimate: AxisEstimate, count: int) -> None:
+def _noise(options: Options) -> SensorNoise:
+    """The sensor's noise, with what the options say of the errors its readings share."""
+    shared = {
+        "direction_offset": ("--direction-offset-deg", options.direction_offset_deg, np.pi / 180),
+        "scale_offset": ("--scale-offset-percent", options.scale_offset_percent, 1e-2),
+        "position_bias": ("--position-bias-mm", options.position_bias_mm, 1e-3),
+    }
+    asked = {}
+    for name, (option, value, unit) in shared.items():
+        if value is not None:
+            if not 0.0 <= value < np.inf:
+                raise ValueError(f"{option} {value:g}: expected a number >= 0")
+            asked[name] = value * unit
+    return replace(sensor_noise(options.sensor), **asked)
+
+
+def _assumptions(options: Options) -> Assumptions:
+    if not 0.0 <= options.gross_error < 0.5:
+        raise ValueError(f"--gross-error {options.gross_error:g}: expected within [0, 0.5)")
+    slope = options.slope_deg
+    if slope is not None and not 0.0 < slope < 90.0:
+        raise ValueError(f"--slope-deg {slope:g}: expected within (0, 90)")
+    return Assumptions(
+        gross_error=options.gross_error, slope=None if slope is None else float(np.deg2rad(slope))
+    )
+
+
+def _print(estimate: AxisEstimate, numbers: list[int]) -> None:
     console = Console()
     colour = {"determined": "green", "ambiguous": "yellow", "undetermined": "red"}
     console.print(
-        f"[bold {colour[estimate.verdict]}]{estimate.verdict}[/] from {count} contacts "
+        f"[bold {colour[estimate.verdict]}]{estimate.verdict}[/] from {len(numbers)} contacts "
         f"(fit p = {estimate.p_value:.2g})"
     )
     for reason in estimate.reasons:
         console.print(f"  {reason}")
+    for line in _suspects(estimate, numbers):
+        console.print(f"  {line}")
+    if estimate.nuisances:
+        console.print("\n[bold]Errors that contacts share[/]", _nuisances(estimate))
     console.print("\n[bold]Axes that explain the contacts[/]", _hypotheses(estimate))
     console.print("[bold]Which row of each contact is the parallel's[/]", _labellings(estimate))
+
+
+def _suspects(estimate: AxisEstimate, numbers: list[int]) -> list[str]:
+    """Contacts that may be grossly wrong, by their numbers in the file."""
+    return [
+        f"[yellow]contact {number} may be grossly wrong (P {p:.2f}): touch there again[/]"
+        for number, p in zip(numbers, estimate.gross_errors, strict=True)
+        if p > SUSPECT
+    ]
+
+
+def _nuisances(estimate: AxisEstimate) -> Table:
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for heading in ("of", "error", "found", "sd"):
+        table.add_column(heading, justify="right" if heading in ("found", "sd") else "left")
+    for nuisance in estimate.nuisances:
+        words, unit, digits = SHARED[nuisance.name]
+        table.add_row(
+            nuisance.owner or "all",
+            words,
+            " ".join(f"{unit * x:.{digits}f}" for x in nuisance.mean),
+            " ".join(f"{unit * x:.{digits}f}" for x in nuisance.sd),
+        )
+    return table
 
 
 def _hypotheses(estimate: AxisEstimate) -> Table:

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.axis import Axis, angle_between, from_chart, to_chart
-from estimator.band import coarse_band
+from estimator.axis import Axis, angle_between, from_chart, offset_at, to_chart
 from estimator.belief import Belief, coarse_belief, sample_objects, update
 from estimator.contact import Miss
 from estimator.prior import AxisPrior, coarse_prior
@@ -94,25 +93,6 @@ def test_the_band_learns_radius_and_slope_where_it_was_touched():
     assert np.all(ends > middle)
 
 
-def test_conditioning_a_band_is_exact_linear_gaussian():
-    """Against the textbook formula on a dense draw: mean and sd at the observed place."""
-    band = coarse_band(0.03, 0.005, (-0.05, 0.05))
-    told = band.conditioned(
-        np.array([0.01]), np.array([0.036]), np.array([0.1]),
-        r_sd=np.array([1e-3]), dr_sd=np.array([0.02]),
-    )  # fmt: skip
-    drawn = band.sample(200_000, rng=np.random.default_rng(0))
-    from scipy.interpolate import CubicSpline
-
-    spline = CubicSpline(band.z, drawn, axis=1, bc_type="natural")
-    misfit = ((spline(0.01) - 0.036) / 1e-3) ** 2 + ((spline(0.01, 1) - 0.1) / 0.02) ** 2
-    weight = np.exp(-0.5 * misfit)
-    effective = weight.sum() ** 2 / np.sum(weight**2)
-    mean = weight @ drawn / weight.sum()
-    assert effective > 500
-    np.testing.assert_allclose(told.mean, mean, atol=4 * told.sd.max() / np.sqrt(effective))
-
-
 def test_flat_ends_do_not_bend_the_profile():
     surface = SurfaceOfRevolution(AXIS, cylinder(0.033, 0.1))
     u = AXIS.direction
@@ -145,6 +125,70 @@ def test_many_misses_weigh_as_one():
     spot = AXIS.point + 0.03 * np.cross(AXIS.direction, [1.0, 0, 0])
     once, often = (update(coarse(), [Miss(spot, 0.012)] * count) for count in (1, 9))
     np.testing.assert_allclose(once.axis.direction, often.axis.direction, atol=1e-6)
+
+
+ELSEWHERE = AXIS.point + np.array([0.1, 0.2, -0.1])
+PARTIAL = {
+    "no direction": {"axis": Axis(AXIS.point, [0.0, 0.9, 0.3]), "angle": 3.0},
+    "no position": {"axis": Axis(ELSEWHERE, AXIS.direction), "offset": 1.0},
+    "no radius": {"radius": 0.1, "radius_sd": 1.0},
+    "radius only": {"axis": Axis(ELSEWHERE, [0.0, 0.9, 0.3]), "angle": 3.0, "offset": 1.0},
+    "nothing": {
+        "axis": Axis(ELSEWHERE, [0.0, 0.9, 0.3]), "angle": 3.0, "offset": 1.0,
+        "radius": 0.1, "radius_sd": 1.0,
+    },
+}  # fmt: skip
+
+
+def partial(name, **more):
+    """What a camera told of it: all but what is named, there with a spread as good as infinite."""
+    known = {"axis": AXIS, "angle": 0.26, "offset": 0.015, "radius": 0.033, "radius_sd": 0.008}
+    return coarse_belief(coarse_prior(**(known | PARTIAL[name] | more)), (-0.15, 0.15))
+
+
+@pytest.mark.parametrize("name", PARTIAL)
+def test_a_prior_may_leave_out_what_the_camera_did_not_see(name):
+    """Three noisy touches, ten times: determined, near the truth, inside the stated region."""
+    chi = []
+    for seed in range(10):
+        contacts = touches(cone(0.033, 0.2, 0.1), rng=np.random.default_rng(seed))
+        after = update(partial(name), contacts)
+        assert after.estimate.verdict == "determined"
+        assert np.rad2deg(angle_between(after.axis, AXIS)) < 8.0
+        assert offset_at(after.axis, AXIS, AXIS.point) < 4e-3
+        x = to_chart(after.axis, AXIS)
+        chi.append(x @ np.linalg.solve(after.covariance, x))
+    assert np.mean(np.array(chi) < 9.49) >= 0.8
+    assert np.all(np.isfinite(sample_objects(after, 50, rng=np.random.default_rng(0)).radii))
+
+
+@pytest.mark.parametrize("name", PARTIAL)
+def test_a_partial_prior_leaves_free_what_one_touch_cannot_tell(name):
+    after = update(partial(name), touches(cone(0.033, 0.2, 0.1))[:1])
+    assert after.estimate.verdict == "undetermined"
+    assert np.all(np.isfinite(after.covariance))
+    assert np.linalg.eigvalsh(after.covariance)[0] > 0.0
+
+
+@pytest.mark.parametrize("name", ["no direction", "no position"])
+def test_a_miss_tells_a_partial_prior_where_the_axis_is_not(name):
+    """The tip 15 mm beside the believed axis, the object's wall believed at 33 mm."""
+    belief = partial(name, offset=0.03) if name == "no direction" else partial(name)
+    across = np.cross(belief.axis.direction, [1.0, 0, 0])
+    tip = belief.axis.point + 0.015 * across / np.linalg.norm(across)
+    after = update(belief, [Miss(tip, 0.012)])
+    assert np.linalg.norm(after.axis.foot(tip) - tip) > 0.033
+
+
+def test_a_miss_that_an_unknown_direction_puts_past_an_end_says_nothing():
+    """12 cm from the middle of an object 30 cm long: beside its wall, or past its end."""
+    tip = AXIS.point + np.array([0.12, 0.0, 0.0])
+    for name, angle in (("no direction", 3.0), ("no radius", 0.1)):
+        known = {"axis": Axis(AXIS.point, [0.0, 0.0, 1.0]), "radius": 0.13, "radius_sd": 0.01}
+        belief = partial(name, angle=angle, **known)
+        after = update(belief, [Miss(tip, 0.012)])
+        moved = offset_at(after.axis, belief.axis, AXIS.point)
+        assert moved < 1e-9 if name == "no direction" else moved > 1e-3
 
 
 @pytest.mark.parametrize("seed", range(5))

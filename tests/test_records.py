@@ -2,6 +2,7 @@
 
 import copy
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,9 +10,14 @@ import pytest
 
 from estimator.axis import Axis
 from estimator.fusion import estimate_axis
-from estimator.profile import barrel, cylinder
+from estimator.profile import barrel, cylinder, sphere
 from estimator.readings import SD_DIRECTION, VOID, readings_of
-from estimator.records import contacts_from_record, estimate_record, read_contacts
+from estimator.records import (
+    contact_record,
+    contacts_from_record,
+    estimate_record,
+    read_contacts,
+)
 from estimator.sensors import SENSORS
 from estimator.surface import Place, SurfaceOfRevolution
 from planner.messages import outcome_record
@@ -50,11 +56,60 @@ def test_an_estimate_survives_json():
     estimate = estimate_axis(contacts_from_record(record(), NOISE))
     told = json.loads(json.dumps(estimate_record(estimate), allow_nan=False))
     assert set(told) >= {
-        "axis", "covariance", "labellings", "hypotheses", "verdict", "reasons"
+        "axis", "covariance", "labellings", "hypotheses", "verdict", "reasons", "p_value",
+        "free_motions", "nuisances", "gross_errors",
     }  # fmt: skip
     np.testing.assert_allclose(told["axis"]["direction"], estimate.axis.direction)
     assert np.shape(told["covariance"]) == (4, 4)
     assert told["labellings"][0]["parallel_rows"] == [0, 0, 0]
+
+
+def test_what_was_found_of_sensor_and_finger_survives_json():
+    data = record()
+    for entry, finger in zip(data["contacts"], ("thumb", "index", "thumb"), strict=True):
+        entry |= {"finger": finger, "sensor": "gel 1"}
+    noise = replace(NOISE, direction_offset=0.1, scale_offset=0.1, position_bias=1e-3)
+    estimate = estimate_axis(contacts_from_record(data, noise))
+    told = json.loads(json.dumps(estimate_record(estimate), allow_nan=False))
+    assert [(n["name"], n["owner"]) for n in told["nuisances"]] == [
+        ("direction_offset", "gel 1"), ("scale_offset", "gel 1"),
+        ("position_bias", "thumb"), ("position_bias", "index"),
+    ]  # fmt: skip
+    assert [len(n["mean"]) for n in told["nuisances"]] == [1, 1, 3, 3]
+    for nuisance, found in zip(told["nuisances"], estimate.nuisances, strict=True):
+        np.testing.assert_array_equal(nuisance["mean"], found.mean)
+        np.testing.assert_array_equal(nuisance["sd"], found.sd)
+    assert told["gross_errors"] == [0.0, 0.0, 0.0]
+
+
+def test_free_motions_survive_json():
+    """Touches of a sphere leave every direction through its centre."""
+    surface = SurfaceOfRevolution(Axis([0.1, 0.2, 0.3], [0, 0, 1.0]), sphere(0.04, 0.06))
+    places = ((0.0, -0.02), (1.2, 0.0), (2.3, 0.02), (4.0, 0.01))
+    estimate = estimate_axis([surface.contact(Place(t, z), NOISE) for t, z in places])
+    told = json.loads(json.dumps(estimate_record(estimate), allow_nan=False))
+    assert len(told["free_motions"]) == 2
+    for motion in told["free_motions"]:
+        assert set(motion) == {"pivot", "shift", "tilt"}
+        np.testing.assert_allclose(motion["pivot"], [0.1, 0.2, 0.3], atol=1e-3)
+        assert np.linalg.norm(motion["tilt"]) > 1.0
+
+
+def test_a_contact_survives_json():
+    surface = SurfaceOfRevolution(Axis([0.1, 0.2, 0.3], [0, 0.3, 1.0]), cylinder(0.03, 0.1))
+    exact = [surface.contact(Place(t, 0.01), NOISE) for t in (0.0, 1.0)]
+    named = [replace(c, finger=f, sensor="gel") for c, f in zip(exact, ("a", "b"), strict=True)]
+    named[1] = replace(named[1], curvatures=[30.0, np.nan])
+    told = json.dumps({"unit": "m", "contacts": [contact_record(c) for c in named]})
+    for a, b in zip(contacts_from_record(json.loads(told), NOISE), named, strict=True):
+        np.testing.assert_allclose(a.position, b.position)
+        np.testing.assert_allclose(a.directions, b.directions, atol=1e-12)
+        np.testing.assert_array_equal(a.curvatures, b.curvatures)
+        assert (a.finger, a.sensor) == (b.finger, b.sensor)
+
+
+def test_contacts_without_names_share_one_finger_and_one_sensor():
+    assert {(c.finger, c.sensor) for c in contacts_from_record(record(), NOISE)} == {("", "")}
 
 
 def test_null_is_a_saturated_curvature():
@@ -123,6 +178,8 @@ BAD = [
     (("contacts", 2, "curvatures"), [1, "flat"], "contact 3: curvatures: expected two numbers"),
     (("contacts", 2, "curvatures"), [1], "contact 3: curvatures: expected two numbers"),
     (("contacts", 2, "curvatures"), [1, True], "contact 3: curvatures: expected two numbers"),
+    (("contacts", 1, "finger"), 2, "contact 2: finger: expected a name, got 2"),
+    (("contacts", 1, "sensor"), None, "contact 2: sensor: expected a name, got None"),
 ]
 
 
