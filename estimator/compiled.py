@@ -31,14 +31,18 @@ def _folder() -> Path:
 
 
 _FOLDER = str(_folder())
+FAST = {"contract", "reassoc", "nsz", "arcp"}
 
 
 def compiled(function: F) -> F:
-    """numba.njit that a type checker sees through; division by zero gives inf, as in numpy."""
+    """numba.njit that a type checker sees through; division by zero gives inf, as in numpy.
+
+    Sums may be contracted and reordered, infinities and NaN keep their meaning.
+    """
     other = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = _FOLDER  # read while a function is decorated
     try:
-        return cast(F, numba.njit(cache=True, error_model="numpy")(function))
+        return cast(F, numba.njit(cache=True, error_model="numpy", fastmath=FAST)(function))
     finally:
         numba.config.CACHE_DIR = other
 

@@ -67,7 +67,7 @@ def _fill_information(readings: Readings, lines: Array, out: Array) -> None:
         for i in range(readings.shape[1]):
             row = readings[s, i]
             seen = seen_from(row, a, u, (0.0, 0.0, 0.0), 0.0)
-            fill_motions(seen, E1, E2, rows)
+            fill_motions(seen, E1, E2, rows, WITH_ROTATION)
             fit = fit_of(row, seen, 0.0)
             fill_derivatives(row, seen, fit, 1.0, 0.0, gradient, fisher, rows, WITH_ROTATION)
             for j in range(WITH_ROTATION):

@@ -175,10 +175,10 @@ def _curvature_fit(
 
 
 @compiled
-def fill_motions(seen: Seen, E1: V3, E2: V3, rows: Array) -> None:
+def fill_motions(seen: Seen, E1: V3, E2: V3, rows: Array, locals_: int) -> None:
     """How A, B, C, R, beta, m_n, m_u and theta move with the parameters, into rows (8, 9)."""
     for k in range(4):
-        for j in range(LOCAL):
+        for j in range(locals_):
             rows[k, j] = 0.0
     for j in range(2):
         E = E1 if j == 0 else E2
@@ -186,16 +186,18 @@ def fill_motions(seen: Seen, E1: V3, E2: V3, rows: Array) -> None:
         rows[A, j], rows[R, j] = e / seen.r, -rad
         rows[A, 2 + j], rows[R, 2 + j] = seen.z * e / seen.r, -seen.z * rad
         rows[B, 2 + j], rows[C, 2 + j] = e, rad
-    for j in range(3):
-        rows[A, 6 + j], rows[R, 6 + j] = seen.e[j] / seen.r, -seen.rad[j]
+    if locals_ == LOCAL:
+        for j in range(3):
+            rows[A, 6 + j], rows[R, 6 + j] = seen.e[j] / seen.r, -seen.rad[j]
     across = max(1.0 - seen.beta**2, 1e-12)  # of e's projection into the tangent plane, squared
-    for j in range(LOCAL):
+    for j in range(locals_):
         A_j, B_j, C_j = rows[A, j], rows[B, j], rows[C, j]
         rows[BETA, j] = A_j * seen.m_n - B_j * seen.m_u
         rows[MN, j] = -A_j * seen.beta - C_j * seen.m_u
         rows[MU, j] = B_j * seen.beta + C_j * seen.m_n
         rows[THETA, j] = -(A_j * seen.m_u + B_j * seen.m_n) / across
-    rows[THETA, 4] = 1.0
+    if locals_ > 4:
+        rows[THETA, 4] = 1.0
 
 
 @compiled

@@ -29,9 +29,11 @@ from estimator.readings import VOID, Readings
 from estimator.seeds import complex_lines, most_seeds, seed_lines
 from estimator.vectors import Array, Index
 
-DRAMATICALLY_WORSE = 25.0  # cost above the best at which a peak no longer counts
+DRAMATICALLY_WORSE = 16.0  # cost above the best at which a peak no longer counts
 MOST_PEAKS = 16
-MOST_CLIMBS = 40
+MOST_STARTS = 24  # seeds from which a few steps are taken
+FIRST_STEPS = 3
+HOPELESS = 0.05  # of what a climb lags behind the best: gaining less than this in a step, it rests
 ROUGH = 30  # steps before a start is compared with the others
 SAME_PEAK = 0.5  # distance in standard deviations below which two peaks are one
 SAME_AXIS = 3.0  # ... below which they are one hypothesis
@@ -51,8 +53,8 @@ class Modes(NamedTuple):
         contacts: Information of the line from the contacts alone, nuisances out, (S, M, 4, 4).
         parallel_rows: Probability that row 0 of each contact is the parallel's, (S, M, n).
         right: Probability that each contact is no gross error, (S, M, n).
-        chi_square, freedom: Sum of squares of the contacts' residuals, and how many there are
-            beyond the four of the line, gross errors left out, (S, M).
+        tally: Sum of squares of the contacts' residuals and how many there are beyond the four
+            of the line; gross errors left out, and all of them, (S, M, 4).
         leader: First peak of the same hypothesis, (S, M).
     """
 
@@ -64,8 +66,7 @@ class Modes(NamedTuple):
     contacts: Array
     parallel_rows: Array
     right: Array
-    chi_square: Array
-    freedom: Array
+    tally: Array
     leader: Index
 
 
@@ -83,8 +84,7 @@ def find_modes(readings: Readings, nuisances: Nuisances, background: Background)
         np.zeros((S, M, 4, 4)),
         np.zeros((S, M, n)),
         np.zeros((S, M, n)),
-        np.zeros((S, M)),
-        np.zeros((S, M)),
+        np.zeros((S, M, 4)),
         np.zeros((S, M), dtype=np.intp),
     )
     _fill(readings, nuisances, background, complex_lines(readings), modes)
@@ -104,11 +104,15 @@ def _fill(
     for s in range(readings.shape[0]):
         count = seed_lines(readings, background, extra, s, seeds)
         _start(readings, nuisances, background, s, seeds, count, starts, costs, work)
-        sort_into(costs, count, order)
-        found = 0
-        for k in range(min(count, MOST_CLIMBS)):
+        count = _first_steps(readings, nuisances, background, s, starts, costs, count, order, work)
+        found, least = 0, costs[order[0]]
+        for k in range(count):
             x = starts[order[k]]
-            cost = climb(readings, nuisances, background, s, x, ROUGH, 1e-2, work)
+            if _on_the_way(readings, nuisances, background, s, x, rough, found, work):
+                continue
+            rest = max(1e-2, HOPELESS * (costs[order[k]] - least))
+            cost = climb(readings, nuisances, background, s, x, ROUGH, rest, work)
+            least = min(least, cost)
             found = _keep(background, s, x, cost, work, rough, rough_cost, found)
         sort_into(rough_cost, found, order)
         kept = 0
@@ -119,6 +123,50 @@ def _fill(
                 kept = _keep(background, s, x, cost, work, modes.x[s], modes.cost[s], kept)
         modes.peaks[s] = kept
         _describe(readings, nuisances, background, s, modes, order, costs, work)
+
+
+@compiled
+def _on_the_way(
+    readings: Readings,
+    nuisances: Nuisances,
+    background: Background,
+    s: int,
+    x: Array,
+    kept: Array,
+    count: int,
+    work: Work,
+) -> bool:
+    """Whether a start has come so near to a peak already found that it would end there too."""
+    cost_at(readings, nuisances, background, s, x, True, work)
+    information = marginal(work.fisher)
+    for k in range(count):
+        if separation(background, s, x, kept[k], information) < SAME_AXIS**2:
+            return True
+    return False
+
+
+@compiled
+def _first_steps(
+    readings: Readings,
+    nuisances: Nuisances,
+    background: Background,
+    s: int,
+    starts: Array,
+    costs: Array,
+    count: int,
+    order: Index,
+    work: Work,
+) -> int:
+    """A few steps from the cheapest seeds; `order` then has those worth the whole climb first."""
+    sort_into(costs, count, order)
+    for k in range(min(count, MOST_STARTS)):
+        x = starts[order[k]]
+        cost = climb(readings, nuisances, background, s, x, FIRST_STEPS, 1e-2, work)
+        costs[order[k]] = cost if np.isfinite(cost) else 1e300
+    for k in range(MOST_STARTS, count):
+        costs[order[k]] = 1e300
+    sort_into(costs, count, order)
+    return min(count, MOST_STARTS)
 
 
 @compiled
@@ -258,12 +306,12 @@ def _contacts_alone(
     for j in range(P):
         for m in range(P):
             work.fisher[j, m] = nuisances.precision[j - 4] if j == m and j > 3 else 0.0
-    _, chi_square, freedom = contacts_cost(
-        readings, nuisances, background, s, modes.x[s, k], True, work
-    )
+    contacts_cost(readings, nuisances, background, s, modes.x[s, k], True, work)
+    prior = 0.0
     for j in range(len(nuisances.precision)):
-        chi_square += nuisances.precision[j] * modes.x[s, k, 6 + j] ** 2
-    modes.chi_square[s, k], modes.freedom[s, k] = chi_square, freedom - 4.0
+        prior += nuisances.precision[j] * modes.x[s, k, 6 + j] ** 2
+    for j in range(4):
+        modes.tally[s, k, j] = work.tally[j] + (prior if j % 2 == 0 else -4.0)
     for i in range(readings.shape[1]):
         modes.right[s, k, i] = work.right[i]
     information = marginal(work.fisher)
@@ -287,8 +335,8 @@ def _reorder(modes: Modes, s: int, order: Index) -> None:
             for row in range(4):
                 _swap(modes.contacts[s, k, row], modes.contacts[s, j, row])
             _swap(modes.right[s, k], modes.right[s, j])
-            for value in (modes.cost, modes.chi_square, modes.freedom):
-                value[s, k], value[s, j] = value[s, j], value[s, k]
+            _swap(modes.tally[s, k], modes.tally[s, j])
+            modes.cost[s, k], modes.cost[s, j] = modes.cost[s, j], modes.cost[s, k]
 
 
 @compiled
@@ -314,7 +362,7 @@ def _parallel_row(
     delta, _, bias = states_of(nuisances, i, x)
     seen = seen_from(readings[s, i], a, u, bias, delta)
     E1, E2 = across(u)
-    fill_motions(seen, E1, E2, work.rows)
+    fill_motions(seen, E1, E2, work.rows, LOCAL)
     total = 0.0
     for j in range(LOCAL):
         J = place(nuisances, i, j)

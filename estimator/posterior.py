@@ -49,6 +49,8 @@ class Work(NamedTuple):
 
     gradient: Array  # (P,)
     fisher: Array  # (P, P), lower triangle
+    kept_gradient: Array  # (P,)
+    kept_fisher: Array  # (P, P)
     local_gradient: Array  # (9,)
     local_fisher: Array  # (9, 9)
     rows: Array  # (8, 9)
@@ -56,11 +58,14 @@ class Work(NamedTuple):
     lifted: Array  # (P, P)
     step: Array  # (P,)
     right: Array  # (n,): probability that each contact is no gross error
+    tally: Array  # sum and number of squared residuals: gross errors left out, and all
 
 
 @compiled
 def work_space(parameters: int, contacts: int) -> Work:
     return Work(
+        np.zeros(parameters),
+        np.zeros((parameters, parameters)),
         np.zeros(parameters),
         np.zeros((parameters, parameters)),
         np.zeros(LOCAL),
@@ -70,6 +75,7 @@ def work_space(parameters: int, contacts: int) -> Work:
         np.zeros((parameters, parameters)),
         np.zeros(parameters),
         np.zeros(contacts),
+        np.zeros(4),
     )
 
 
@@ -120,13 +126,13 @@ def contacts_cost(
     x: Array,
     derivatives: bool,
     work: Work,
-) -> tuple[float, float, float]:
-    """Cost of all contacts of set s, sum and number of squared residuals; derivatives are added
-    to those in work.
-    """
+) -> float:
+    """Cost of all contacts of set s; derivatives are added to those in work, tallies renewed."""
     a, u = line_of(x)
     basis = across(u)
-    cost, chi_square, freedom = 0.0, 0.0, 0.0
+    cost = 0.0
+    for k in range(len(work.tally)):
+        work.tally[k] = 0.0
     locals_ = 4 if len(nuisances.precision) == 0 else LOCAL
     for i in range(readings.shape[1]):
         delta, scale, bias = states_of(nuisances, i, x)
@@ -137,12 +143,15 @@ def contacts_cost(
         if background.gross > 0.0:
             density, trust, normal_only = gross_errors(row, seen, fit, background.gross)
         cost -= density
-        chi_square += (trust + normal_only) * fit.a**2 + trust * (fit.b**2 + fit.c**2)
-        freedom += normal_only + trust
-        freedom += trust * ((row[VOID] == 0.0) + (fit.F_K > 0.0))
+        turned = fit.b**2 + fit.c**2
+        readable = (row[VOID] == 0.0) + (fit.F_K > 0.0)  # residuals beyond the normal's
+        work.tally[0] += (trust + normal_only) * fit.a**2 + trust * turned
+        work.tally[1] += trust + normal_only + trust * readable
+        work.tally[2] += fit.a**2 + turned
+        work.tally[3] += 1.0 + readable
         work.right[i] = trust
         if derivatives:
-            fill_motions(seen, basis[0], basis[1], work.rows)
+            fill_motions(seen, basis[0], basis[1], work.rows, locals_)
             fill_derivatives(
                 row, seen, fit, trust, normal_only,
                 work.local_gradient, work.local_fisher, work.rows, locals_,
@@ -153,7 +162,7 @@ def contacts_cost(
         )  # fmt: skip
         if derivatives:
             _scatter(nuisances, i, work, locals_)
-    return cost, chi_square, freedom
+    return cost
 
 
 @compiled
@@ -197,7 +206,7 @@ def cost_at(
             work.gradient[j] = 0.0
             for k in range(j + 1):
                 work.fisher[j, k] = 0.0
-    cost, _, _ = contacts_cost(readings, nuisances, background, s, x, derivatives, work)
+    cost = contacts_cost(readings, nuisances, background, s, x, derivatives, work)
     for k in range(len(nuisances.precision)):
         cost += 0.5 * nuisances.precision[k] * x[6 + k] ** 2
         if derivatives:
@@ -390,6 +399,20 @@ def solve_lifted(work: Work, damping: float, spread: float) -> None:
 
 
 @compiled
+def _remember(work: Work) -> None:
+    copied(work.gradient, work.kept_gradient)
+    for j in range(len(work.fisher)):
+        copied(work.fisher[j], work.kept_fisher[j])
+
+
+@compiled
+def _recall(work: Work) -> None:
+    copied(work.kept_gradient, work.gradient)
+    for j in range(len(work.fisher)):
+        copied(work.kept_fisher[j], work.fisher[j])
+
+
+@compiled
 def climb(
     readings: Readings,
     nuisances: Nuisances,
@@ -411,15 +434,17 @@ def climb(
     for _ in range(iterations):
         solve_lifted(work, damping, spread)
         move(background, s, x, work.step, trial)
-        found = cost_at(readings, nuisances, background, s, trial, False, work)
+        _remember(work)
+        found = cost_at(readings, nuisances, background, s, trial, True, work)
         gain = cost - found
         if gain > 0.0:
             copied(trial, x)
-            cost = cost_at(readings, nuisances, background, s, x, True, work)
+            cost = found
             damping = max(0.2 * damping, 1e-9)
             if gain < gain_at_rest:
                 break
         else:
+            _recall(work)
             damping *= 8.0
             if damping > 1e7 or gain > -1e-13:
                 break

@@ -28,8 +28,16 @@ CONCAVE = 2.0  # sd by which both curvatures must be negative before a contact c
 # columns of a contact
 POSITION, NORMAL, K0, K1, KAPPA, CENSORED = 0, 3, 6, 9, 12, 14
 EDGE, CONVEX, VOID = 16, 17, 18
-SD_POSITION, SD_NORMAL, SD_DIRECTION, SD_K_TZ, SD_K_TT, SD_SHARE = 19, 20, 21, 22, 23, 24
-COLUMNS = 25
+SD_POSITION, SD_NORMAL, SD_DIRECTION, SD_K_TZ, SD_K_TT, SD_SHARE, SD_COMMON = (
+    19,
+    20,
+    21,
+    22,
+    23,
+    24,
+    25,
+)
+COLUMNS = 26
 
 Readings = Array
 """S sets of n contacts as numbers, (S, n, COLUMNS):
@@ -40,7 +48,8 @@ Readings = Array
     EDGE           curvature that counts as flat [1/m]; infinite where none was measured
     CONVEX, VOID   whether the axis must lie behind the contact; whether directions say nothing
     SD_...         of the position [m], the normal [rad], directions beyond the tensor's [rad],
-                   K_tz and K_tt [1/m], and the relative error of curvatures [-]
+                   K_tz and K_tt [1/m], the relative error of curvatures [-], and the rotation
+                   common to the directions of a sensor [rad]
 """
 
 
@@ -88,13 +97,13 @@ def stacked_readings(
     Args:
         together: Whether contacts of doubtful direction are also judged together.
     """
-    table = np.array([_sds(s) for s in noise], dtype=np.float64).reshape(len(noise), 7)
-    edge = np.broadcast_to(table[:, 6], kappa_read.shape[:2])
+    table = np.array([_sds(s) for s in noise], dtype=np.float64).reshape(len(noise), 8)
+    edge = np.broadcast_to(table[:, 7], kappa_read.shape[:2])
     unmeasured = np.isinf(edge)
     censored = np.isnan(kappa_read)
     kappa = np.where(censored, 0.0, kappa_read)
     kappa = np.where(unmeasured[..., None], [0.5, -0.5], kappa)  # so that K_tz = -sin(2 theta)/2
-    sd = np.array(np.broadcast_to(table[:, :6], (*edge.shape, 6)))
+    sd = np.array(np.broadcast_to(table[:, :7], (*edge.shape, 7)))
     sd[..., 3] = np.where(unmeasured, 0.0, sd[..., 3])
     sd[..., 2] = np.where(unmeasured, np.maximum(sd[..., 2], 1e-9), sd[..., 2])
     half = 0.5 * np.abs(kappa[..., 0] - kappa[..., 1])
@@ -122,7 +131,7 @@ def _sds(noise: SensorNoise) -> tuple[float, ...]:
     tensor = max(noise.deviator, 1e-9)
     return (
         noise.position, noise.normal, noise.direction, tensor, even, noise.curvature_scale,
-        noise.flat,
+        noise.direction_offset, noise.flat,
     )  # fmt: skip
 
 

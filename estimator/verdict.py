@@ -9,11 +9,14 @@ direction that is known gives another; the axis has four unknowns, and four plan
 
 from __future__ import annotations
 
+from math import cos, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
 from scipy.special import chdtrc
 
+from estimator.compiled import V3, along, compiled, dot, scaled
+from estimator.likelihood import vector
 from estimator.modes import Modes
 from estimator.readings import (
     EDGE,
@@ -22,6 +25,7 @@ from estimator.readings import (
     KAPPA,
     NORMAL,
     POSITION,
+    SD_COMMON,
     SD_DIRECTION,
     SD_K_TZ,
     SD_NORMAL,
@@ -29,14 +33,16 @@ from estimator.readings import (
     VOID,
     Readings,
 )
-from estimator.vectors import Array, Index, Mask
+from estimator.vectors import Array, Index, Mask, frozen
 
 FREE = 0.2  # sd [rad], or [-] of the object's size, above which a motion of the axis is free
 FEIGNED = 1.5  # information that the noise of one contact feigns [1/rad^2]
 SURE = 0.99  # probability one hypothesis needs
 MENTIONED = 0.01  # probability from which a hypothesis matters
 MISFIT = 1e-4  # p-value of the fit below which nothing is believed of the axis
-FITS = 0.01  # p-value from which planes count as coincident
+FITS = 1e-4  # p-value from which planes count as coincident, normals as parallel or concurrent
+PIERCED = 10.0  # position errors from a contact within which an axis may not pass
+LIKELY_TURNS = frozen(0.4 * np.arange(-6, 7))  # of a sensor's directions, in its own sd
 REDUNDANT = 5  # planes that contacts must give: one more than the axis has unknowns
 MOST_GROSS = 1.0 / 3.0  # share of the contacts beyond which they are not exceptions
 DETERMINED, AMBIGUOUS, UNDETERMINED = range(3)
@@ -49,8 +55,8 @@ class Findings(NamedTuple):
         verdict: Index into VERDICTS, (S,).
         best: Leading peak of the likeliest hypothesis, (S,).
         probability: Of every hypothesis at its leading peak, zero elsewhere, (S, M).
-        p_value: Of the fit at the best peak, (S,).
-        few, blunt, misfit, coincident, sphere, free: What was found, (S,).
+        p_value: Of the fit of all contacts at the best peak, gross errors or not, (S,).
+        few, blunt, misfit, flat, coincident, sphere, pierced, free: What was found, (S,).
     """
 
     verdict: Index
@@ -60,40 +66,59 @@ class Findings(NamedTuple):
     few: Mask
     blunt: Mask
     misfit: Mask
+    flat: Mask
     coincident: Mask
     sphere: Mask
+    pierced: Mask
     free: Mask
 
 
 def judge(readings: Readings, modes: Modes, size: Array) -> Findings:
     """Verdicts with what they rest on; `size` is a length of each object [m], (S,)."""
-    S, M = modes.cost.shape
-    n = readings.shape[1]
+    S, n = readings.shape[:2]
     rows = np.arange(S)
-    probability = np.zeros((S, M))
-    for k in range(M):
-        probability[rows, modes.leader[:, k]] += modes.probability[:, k]
+    probability = _hypotheses(modes)
     best = np.argmax(probability, axis=1)
-    p_value = fit_p_value(modes.chi_square[rows, best], modes.freedom[rows, best])
-    gross = np.mean(1.0 - modes.right[rows, best], axis=1) if n else np.zeros(S)
-    misfit = (p_value < MISFIT) | (gross > MOST_GROSS)
-    few = np.full(S, n < 2)
-    blunt = n + np.sum(readings[..., VOID] == 0.0, axis=1) < REDUNDANT
-    coincident = planes_coincide(readings) if n > 1 else np.zeros(S, dtype=bool)
-    sphere = normals_meet(readings) if n > 1 else np.zeros(S, dtype=bool)
-    free = np.any((modes.probability > MENTIONED) & (_freest(modes, size, n) > FREE), axis=1)
-    undetermined = few | blunt | misfit | coincident | sphere | free
-    ambiguous = probability[rows, best] < SURE
-    verdict = np.where(undetermined, UNDETERMINED, np.where(ambiguous, AMBIGUOUS, DETERMINED))
-    return Findings(
-        verdict, best, probability, p_value, few, blunt, misfit, coincident, sphere, free
+    tally = modes.tally[rows, best]
+    gross = np.sum(modes.right[rows, best] < 0.5, axis=1)
+    none = np.zeros(S, dtype=bool)
+    reasons = (
+        np.full(S, n < 2),
+        n + np.sum(readings[..., VOID] == 0.0, axis=1) < REDUNDANT,
+        (fit_p_value(tally[:, 0], tally[:, 1]) < MISFIT) | (gross > MOST_GROSS * n),
+        normals_parallel(readings) if n > 1 else none,
+        planes_coincide(readings) if n > 1 else none,
+        normals_meet(readings) if n > 1 else none,
+        np.any(pierced(readings, modes.x[rows, best]), axis=1),
+        np.any((modes.probability > MENTIONED) & (_freest(modes, size, n) > FREE), axis=1),
     )
+    ambiguous = probability[rows, best] < SURE
+    verdict = np.where(ambiguous, AMBIGUOUS, DETERMINED)
+    verdict = np.where(np.any(reasons, axis=0), UNDETERMINED, verdict)
+    return Findings(verdict, best, probability, fit_p_value(tally[:, 2], tally[:, 3]), *reasons)
+
+
+def _hypotheses(modes: Modes) -> Array:
+    """Probability of each hypothesis, at the place of its leading peak, (S, M)."""
+    rows = np.arange(len(modes.leader))
+    probability = np.zeros(modes.probability.shape)
+    for k in range(int(modes.peaks.max(initial=0))):
+        probability[rows, modes.leader[:, k]] += modes.probability[:, k]
+    return probability
 
 
 def fit_p_value(chi_square: Array, freedom: Array) -> Array:
     """How often contacts of a true surface of revolution would fit worse."""
     tail = chdtrc(np.maximum(freedom, 0.5), chi_square)
     return np.asarray(np.where(freedom > 0.5, tail, 1.0))
+
+
+def pierced(readings: Readings, x: Array) -> Mask:
+    """Contacts that an axis passes so near that their parallel has no direction, (S, n)."""
+    gap = readings[..., POSITION:NORMAL] - x[:, None, :3]
+    u = x[:, None, 3:6]
+    gap = gap - np.sum(gap * u, axis=-1, keepdims=True) * u
+    return np.asarray(np.linalg.norm(gap, axis=-1) < PIERCED * readings[..., SD_POSITION])
 
 
 def scaled_information(contacts: Array, size: Array, n: int) -> Array:
@@ -105,7 +130,9 @@ def scaled_information(contacts: Array, size: Array, n: int) -> Array:
     """
     units = np.ones((*size.shape, 4))
     units[..., :2] = size[..., None]
-    return contacts * units[..., :, None] * units[..., None, :] - FEIGNED * n * np.eye(4)
+    scaled = contacts * units[..., :, None] * units[..., None, :]
+    whole = np.all(np.isfinite(scaled), axis=(-2, -1), keepdims=True)
+    return np.asarray(np.where(whole, scaled, 0.0) - FEIGNED * n * np.eye(4))
 
 
 def _freest(modes: Modes, size: Array, n: int) -> Array:
@@ -119,30 +146,80 @@ def _freest(modes: Modes, size: Array, n: int) -> Array:
 
 
 def planes_coincide(readings: Readings) -> Mask:
-    """Whether some labelling makes all meridian planes one plane, within the noise, (S,)."""
-    void = np.any(readings[..., VOID] > 0.0, axis=1)
-    return np.asarray(~void & (_coincide(readings, K0) | _coincide(readings, K1)))
+    """Whether some labelling makes all meridian planes one plane, within the noise, (S,).
+
+    A rotation common to the directions of a sensor may hide it, so all likely ones are tried.
+    """
+    known = np.sum(readings[..., VOID] == 0.0, axis=1)
+    statistic = np.full(len(readings), np.inf)
+    _fill_one_plane(readings, LIKELY_TURNS, statistic)
+    freedom = 2.0 * readings.shape[1] + known - 3.0
+    return np.asarray((known > 0) & (chdtrc(np.maximum(freedom, 1.0), statistic) > FITS))
 
 
-def _coincide(readings: Readings, reference: int) -> Mask:
-    """... when the first contact's row `reference` is the parallel's."""
+@compiled
+def _fill_one_plane(readings: Readings, turns: Array, statistic: Array) -> None:
     n = readings.shape[1]
-    N = np.stack([readings[..., K0:K1], readings[..., K1:KAPPA]], axis=2)  # planes' normals
-    first = readings[:, 0, reference : reference + 3]
-    row = np.argmax(np.abs(np.einsum("snlx,sx->snl", N, first)), axis=2)
-    chosen = np.take_along_axis(N, row[..., None, None], axis=2)[:, :, 0]
-    mean = np.linalg.eigh(np.einsum("snx,sny->sxy", chosen, chosen))[1][..., -1]
-    sine = 1.0 - np.einsum("snx,sx->sn", chosen, mean) ** 2
-    D = 0.5 * np.abs(readings[..., KAPPA] - readings[..., KAPPA + 1])
-    var_turn = (readings[..., SD_K_TZ] / np.maximum(2.0 * D, 1e-9)) ** 2
-    var_turn = var_turn + readings[..., SD_DIRECTION] ** 2 + readings[..., SD_NORMAL] ** 2
-    p = readings[..., POSITION:NORMAL]
-    centred = p - p.mean(axis=1, keepdims=True)
-    reach = np.sum(centred**2, axis=2)
-    var_gap = readings[..., SD_POSITION] ** 2 + reach * var_turn / n
-    gap = np.einsum("snx,sx->sn", centred, mean)
-    statistic = np.sum(np.maximum(sine, 0.0) / var_turn + gap**2 / var_gap, axis=1)
-    return np.asarray(chdtrc(3.0 * n - 3.0, statistic) > FITS)
+    for s in range(readings.shape[0]):
+        common, first = 0.0, -1
+        for i in range(n - 1, -1, -1):
+            common = max(common, readings[s, i, SD_COMMON])
+            first = i if readings[s, i, VOID] == 0.0 else first
+        for turn in turns:
+            if first >= 0 and (common > 0.0 or turn == 0.0):
+                for row in range(2):
+                    found = _one_plane(readings, s, first, row, turn * common) + turn**2
+                    statistic[s] = min(statistic[s], found)
+
+
+@compiled
+def _one_plane(readings: Readings, s: int, first: int, row: int, turn: float) -> float:
+    """Chi-square of one common plane, where `row` of contact `first` is across it.
+
+    A known direction must be across the plane (two numbers), of a void one the normal must be
+    along it, and all contacts must lie in it. The plane's normal is the mean of the directions.
+    """
+    n = readings.shape[1]
+    reference = _turned(readings[s, first], row, turn)
+    mean, centre = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for i in range(n):
+        contact = readings[s, i]
+        centre = along(centre, 1.0 / n, vector(contact, POSITION))
+        if contact[VOID] == 0.0:
+            across = _nearest(contact, reference, turn)
+            mean = along(mean, 1.0 if dot(across, reference) > 0.0 else -1.0, across)
+    mean = scaled(1.0 / sqrt(dot(mean, mean)), mean)
+    total = 0.0
+    for i in range(n):
+        contact = readings[s, i]
+        var_n, var_p = contact[SD_NORMAL] ** 2, contact[SD_POSITION] ** 2
+        spread = max(abs(contact[KAPPA] - contact[KAPPA + 1]), 1e-9)
+        var_turn = (contact[SD_K_TZ] / spread) ** 2 + contact[SD_DIRECTION] ** 2 + var_n
+        away = along(vector(contact, POSITION), -1.0, centre)
+        if contact[VOID] == 0.0:
+            cosine = dot(_nearest(contact, reference, turn), mean)
+            total += max(1.0 - cosine**2, 0.0) / var_turn
+        else:
+            total += dot(vector(contact, NORMAL), mean) ** 2 / var_n
+            var_turn = var_n
+        total += dot(away, mean) ** 2 / (var_p + dot(away, away) * var_turn / n)
+    return total
+
+
+@compiled
+def _turned(contact: Array, row: int, turn: float) -> V3:
+    """A measured direction, turned back about the normal."""
+    k0, k1 = vector(contact, K0), vector(contact, K1)
+    if row == 0:
+        return along(scaled(cos(turn), k0), -sin(turn), k1)
+    return along(scaled(cos(turn), k1), sin(turn), k0)
+
+
+@compiled
+def _nearest(contact: Array, reference: V3, turn: float) -> V3:
+    """The one of its two directions that is nearer to the reference."""
+    first, second = _turned(contact, 0, turn), _turned(contact, 1, turn)
+    return first if abs(dot(first, reference)) >= abs(dot(second, reference)) else second
 
 
 def meeting_point(readings: Readings) -> tuple[Array, Array]:
@@ -154,6 +231,15 @@ def meeting_point(readings: Readings) -> tuple[Array, Array]:
     pull = np.where(least < 1e-9, 1e-9, 0.0)[:, None, None] * np.eye(3)
     centre = np.linalg.solve(total + pull, np.einsum("snij,snj->si", across, p)[..., None])
     return centre[..., 0], least
+
+
+def normals_parallel(readings: Readings) -> Mask:
+    """Whether all normals are one direction within their noise, as on a flat end, (S,)."""
+    n = readings[..., NORMAL:K0]
+    mean = n.mean(axis=1, keepdims=True)
+    mean = mean / np.maximum(np.linalg.norm(mean, axis=-1, keepdims=True), 1e-12)
+    square = np.sum((n - mean) ** 2, axis=-1) / readings[..., SD_NORMAL] ** 2
+    return np.asarray(chdtrc(2.0 * n.shape[1] - 2.0, np.sum(square, axis=1)) > FITS)
 
 
 def normals_meet(readings: Readings) -> Mask:

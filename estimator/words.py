@@ -9,9 +9,18 @@ import numpy as np
 from estimator.contact import Contact
 from estimator.estimate import FreeMotion, Hypothesis
 from estimator.modes import Modes
-from estimator.readings import K0, NORMAL, VOID, Readings
-from estimator.vectors import Array, basis_across, frozen, unit
-from estimator.verdict import FREE, MENTIONED, MISFIT, Findings, meeting_point, scaled_information
+from estimator.readings import VOID, Readings
+from estimator.vectors import Array, Mask, basis_across, frozen, unit
+from estimator.verdict import (
+    FREE,
+    MENTIONED,
+    MISFIT,
+    Findings,
+    fit_p_value,
+    meeting_point,
+    pierced,
+    scaled_information,
+)
 
 MOSTLY_SHIFT = 0.3  # of a unit motion: a tilt below this is none
 
@@ -48,12 +57,18 @@ def undetermined_words(
         return (f"fewer than two contacts ({n}) fix no axis",)
     reasons = _umbilic_words(readings)
     if findings.blunt[0]:
+        known = n - int(readings[0, :, VOID].sum())
         reasons.append(
-            f"{n} normals and the directions of {n - int(readings[0, :, VOID].sum())} contacts leave "
-            "nothing to check the axis by; touch again, where the curvatures differ"
+            f"{n} normals and the directions of {known} contacts leave nothing to check the axis "
+            "by; touch again, where the curvatures differ"
         )
     if findings.misfit[0]:
         reasons.append(_misfit_words(modes, findings))
+    if findings.pierced[0]:
+        names = _numbers(pierced(readings, modes.x[:, findings.best[0]])[0])
+        reasons.append(
+            f"the likeliest axis passes through contact {names}, where a parallel has no direction"
+        )
     if findings.coincident[0]:
         names = ", ".join(str(i + 1) for i in range(n))
         reasons.append(
@@ -61,26 +76,23 @@ def undetermined_words(
             "meridian, or one parallel where the profile has no slope: every line in that plane "
             "fits one labelling; touch outside that plane"
         )
+    elif findings.flat[0]:
+        reasons.append(
+            "all normals are parallel, as on a flat end: the axis may pass anywhere along them; "
+            "touch the side"
+        )
     if findings.sphere[0]:
         reasons.append(_sphere_words(meeting_point(readings)[0][0]))
-    for k in range(modes.peaks[0]):
+    for k in range(0 if findings.flat[0] else modes.peaks[0]):
         if modes.probability[0, k] > MENTIONED:
-            reasons += _freedom_words(contacts, readings, modes, k, size)
+            reasons += _freedom_words(contacts, modes, k, size)
     return tuple(dict.fromkeys(reasons))
 
 
-def _freedom_words(
-    contacts: Sequence[Contact], readings: Readings, modes: Modes, k: int, size: float
-) -> list[str]:
+def _freedom_words(contacts: Sequence[Contact], modes: Modes, k: int, size: float) -> list[str]:
     motions = free_motions(modes, k, size, len(contacts))
     if not motions:
         return []
-    normals = readings[0, :, NORMAL:K0]
-    if np.linalg.svd(normals - normals.mean(0))[1][0] < 0.1:
-        return [
-            "all normals are parallel, as on a flat end: the axis may pass anywhere along them; "
-            "touch the side"
-        ]
     if len(motions) == 2 and all(_tilts(m, size) for m in motions):
         return [_sphere_words(motions[0].pivot)]
     return [_motion_words(contacts, motion, size) for motion in motions]
@@ -93,11 +105,10 @@ def _tilts(motion: FreeMotion, size: float) -> bool:
 
 def _motion_words(contacts: Sequence[Contact], motion: FreeMotion, size: float) -> str:
     if not _tilts(motion, size):
-        amount = 1e3 * float(np.linalg.norm(motion.shift))
-        return (
-            f"the touches leave the axis free to shift along {_direction(unit(motion.shift))} "
-            f"(sd {amount:.0f} mm from the touches)"
-        )
+        amount = float(np.linalg.norm(motion.shift))
+        sd = f"sd {1e3 * amount:.0f} mm from the touches" if amount < 10.0 * size else "any way"
+        along = _direction(unit(motion.shift))
+        return f"the touches leave the axis free to shift along {along} ({sd})"
     about = unit(motion.tilt)
     gaps = [np.linalg.norm(np.cross(c.position - motion.pivot, about)) for c in contacts]
     near = [str(i + 1) for i, gap in enumerate(gaps) if gap < 0.15 * size]
@@ -111,11 +122,11 @@ def _motion_words(contacts: Sequence[Contact], motion: FreeMotion, size: float) 
 
 
 def _umbilic_words(readings: Readings) -> list[str]:
-    void = np.nonzero(readings[0, :, VOID])[0]
-    if len(void) == 0:
+    void = readings[0, :, VOID] > 0.0
+    if not np.any(void):
         return []
-    names = ", ".join(str(i + 1) for i in void)
-    plural = "contacts" if len(void) > 1 else "contact"
+    names = _numbers(void)
+    plural = "contacts" if np.sum(void) > 1 else "contact"
     return [
         f"{plural} {names}: both curvatures are equal within noise (umbilic), the directions say "
         "nothing"
@@ -124,11 +135,17 @@ def _umbilic_words(readings: Readings) -> list[str]:
 
 def _misfit_words(modes: Modes, findings: Findings) -> str:
     blame = "the object moved, is not round, or the sensor is worse than stated"
-    if findings.p_value[0] < MISFIT:
-        return f"the contacts fit no surface of revolution (p = {findings.p_value[0]:.1g}): {blame}"
-    wrong = np.nonzero(modes.right[0, findings.best[0]] < 0.5)[0]
-    names = ", ".join(str(i + 1) for i in wrong)
+    tally = modes.tally[0, findings.best[0]]
+    p = float(fit_p_value(tally[0], tally[1]))
+    if p < MISFIT:
+        return f"the contacts fit no surface of revolution (p = {p:.1g}): {blame}"
+    names = _numbers(modes.right[0, findings.best[0]] < 0.5)
     return f"contacts {names} fit no surface of revolution with the others: {blame}"
+
+
+def _numbers(chosen: Mask) -> str:
+    """Contacts by their numbers, from one."""
+    return ", ".join(str(i + 1) for i in np.nonzero(chosen)[0])
 
 
 def _sphere_words(centre: Array) -> str:
