@@ -47,7 +47,7 @@ class TellingContact:
         position: On the surface that the likeliest axis predicts, world [m], (3,).
         normal: Outward normal expected there; the finger comes along its opposite, (3,).
         log_odds: Expected after that touch, of the axis that is right against all others; no
-            more than `PLAIN`.
+            more than `PLAIN`. A forecast from a smooth profile and readings without noise.
         pair: The two hypotheses it tells apart, as indices: the likeliest and its first rival.
     """
 
@@ -55,11 +55,6 @@ class TellingContact:
     normal: Array
     log_odds: float
     pair: tuple[int, int]
-
-    @property
-    def probability(self) -> float:
-        """Of the right axis, expected after that touch."""
-        return float(1.0 / (1.0 + np.exp(-self.log_odds)))
 
 
 def telling_contact(
@@ -107,8 +102,8 @@ def telling_words(telling: TellingContact | None) -> str:
     place = ", ".join(f"{1e3 * x:.1f}" for x in telling.position)
     approach = ", ".join(f"{-x:.2f}" for x in telling.normal)
     return (
-        f"touch near ({place}) mm, approached along [{approach}]: the right axis is expected to "
-        f"have P {telling.probability:.3f} then"
+        f"touch near ({place}) mm, approached along [{approach}]: that tells them apart best "
+        f"(log odds of {telling.log_odds:.1f} expected)"
     )
 
 
