@@ -38,7 +38,8 @@ class Hypothesis:
     @property
     def angle_95(self) -> float:
         """The direction is off by no more than this with 95 % probability [rad]."""
-        return CHI_95 * float(np.sqrt(np.linalg.eigvalsh(self.covariance[2:, 2:])[-1]))
+        sd = float(np.sqrt(np.linalg.eigvalsh(self.covariance[2:, 2:])[-1]))
+        return min(CHI_95 * sd, 0.5 * np.pi)  # two lines are never farther apart
 
     @property
     def offset_95(self) -> float:
@@ -80,6 +81,24 @@ class Nuisance:
 
 
 @dataclass(frozen=True, eq=False)
+class TellingContact:
+    """Where to touch next, to find out which axis is right.
+
+    Args:
+        position: On the surface that the likeliest axis predicts, world [m], (3,).
+        normal: Outward normal expected there; the finger comes along its opposite, (3,).
+        log_odds: Expected after that touch, of the axis that is right against all others; no
+            more than 8. A forecast from a smooth profile and readings without noise.
+        pair: The two hypotheses it tells apart, as indices: the likeliest and its first rival.
+    """
+
+    position: Array
+    normal: Array
+    log_odds: float
+    pair: tuple[int, int]
+
+
+@dataclass(frozen=True, eq=False)
 class AxisEstimate:
     """The axis, with everything that must be known before it is trusted.
 
@@ -94,6 +113,7 @@ class AxisEstimate:
         free_motions: Of the likeliest axis, freest first.
         nuisances: What else was estimated, at the likeliest axis.
         gross_errors: Probability that each contact is grossly wrong, (n,).
+        telling: Where to touch next to tell several axes apart, where `ambiguous`.
     """
 
     hypotheses: tuple[Hypothesis, ...]
@@ -104,6 +124,7 @@ class AxisEstimate:
     free_motions: tuple[FreeMotion, ...]
     nuisances: tuple[Nuisance, ...]
     gross_errors: Array
+    telling: TellingContact | None = None
 
     @property
     def best(self) -> Hypothesis:

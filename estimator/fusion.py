@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -26,6 +27,7 @@ from estimator.problem import (
     nuisances_of,
 )
 from estimator.readings import Readings, readings_of, readings_of_sets
+from estimator.telling import telling_contact, telling_words
 from estimator.vectors import Array, Index, frozen
 from estimator.verdict import AMBIGUOUS, DETERMINED, Findings, judge
 from estimator.words import ambiguous_words, determined_words, free_motions, undetermined_words
@@ -73,7 +75,12 @@ def estimate_axis(
     modes = _modes(readings, nuisances, background)
     size = prior.radius if prior is not None else float(background.lines[0, SPREAD])
     findings = judge(readings, modes, np.array([size]))
-    return _estimate(contacts, readings, states, modes, findings, size)
+    estimate = _estimate(contacts, readings, states, modes, findings, size)
+    if estimate.verdict != "ambiguous":
+        return estimate
+    telling = telling_contact(estimate.hypotheses, contacts, prior=prior, assumptions=assumptions)
+    reasons = (*estimate.reasons, telling_words(telling))
+    return replace(estimate, telling=telling, reasons=reasons)
 
 
 def estimate_axes(

@@ -21,12 +21,14 @@ Estimates out, [m] and [rad]:
      "verdict": "determined" | "ambiguous" | "undetermined", "reasons": [text], "p_value",
      "free_motions": [{"pivot": [3], "shift": [3], "tilt": [3]}],
      "nuisances": [{"name", "owner", "mean": [1 or 3], "sd": [1 or 3]}],
-     "gross_errors": [n]}
+     "gross_errors": [n],
+     "telling": null | {"position": [3], "normal": [3], "log_odds"}}
 
 Free motions are what the touches leave open of the likeliest axis: one standard deviation, a shift
 [m] and a rotation vector about the pivot [rad]. Nuisances are what was found of the sensor or
 finger that is the owner: "direction_offset" [rad], "scale_offset", the log of measured over true
 radius, and "position_bias" [m]. Gross errors are the probabilities that a contact is grossly wrong.
+Telling is where to touch next, where several axes fit.
 """
 
 from __future__ import annotations
@@ -40,7 +42,7 @@ from typing import Any
 import numpy as np
 
 from estimator.contact import Contact, SensorNoise, measured_contact, require_distinct
-from estimator.estimate import AxisEstimate, FreeMotion, Hypothesis, Nuisance
+from estimator.estimate import AxisEstimate, FreeMotion, Hypothesis, Nuisance, TellingContact
 
 UNITS = {"m": 1.0, "mm": 1e-3, "in": 0.0254}
 FIELDS = ("position", "normal", "directions", "curvatures")
@@ -173,6 +175,7 @@ def estimate_record(estimate: AxisEstimate) -> dict[str, Any]:
         "free_motions": [_motion_record(motion) for motion in estimate.free_motions],
         "nuisances": [_nuisance_record(nuisance) for nuisance in estimate.nuisances],
         "gross_errors": estimate.gross_errors.tolist(),
+        "telling": None if estimate.telling is None else _telling_record(estimate.telling),
     }
 
 
@@ -196,6 +199,14 @@ def contact_record(contact: Contact) -> dict[str, Any]:
 
 def _motion_record(motion: FreeMotion) -> dict[str, list[float]]:
     return {name: getattr(motion, name).tolist() for name in ("pivot", "shift", "tilt")}
+
+
+def _telling_record(telling: TellingContact) -> dict[str, Any]:
+    return {
+        "position": telling.position.tolist(),
+        "normal": telling.normal.tolist(),
+        "log_odds": telling.log_odds,
+    }
 
 
 def _nuisance_record(nuisance: Nuisance) -> dict[str, Any]:

@@ -10,14 +10,14 @@ a wrong axis evades the next contact by moving, often right across the object.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 
 import numpy as np
 
 from estimator.assumptions import Assumptions
 from estimator.axis import Axis
 from estimator.contact import Contact
-from estimator.estimate import Hypothesis
+from estimator.estimate import Hypothesis, TellingContact
 from estimator.modes import Modes, find_modes
 from estimator.prior import AxisPrior
 from estimator.problem import Owner, background_of, nuisance_states, nuisances_of
@@ -37,24 +37,6 @@ PLAIN = 8.0  # log odds beyond which an axis needs no more
 BLUR = 10.0  # log odds that a radian less of uncertainty is worth
 TELLS = 1.0  # log odds a touch must be expected to add, to be worth naming
 DEFAULT = Assumptions()
-
-
-@dataclass(frozen=True, eq=False)
-class TellingContact:
-    """Where to touch next, to find out which axis is right.
-
-    Args:
-        position: On the surface that the likeliest axis predicts, world [m], (3,).
-        normal: Outward normal expected there; the finger comes along its opposite, (3,).
-        log_odds: Expected after that touch, of the axis that is right against all others; no
-            more than `PLAIN`. A forecast from a smooth profile and readings without noise.
-        pair: The two hypotheses it tells apart, as indices: the likeliest and its first rival.
-    """
-
-    position: Array
-    normal: Array
-    log_odds: float
-    pair: tuple[int, int]
 
 
 def telling_contact(

@@ -29,7 +29,7 @@ def errors(result, name="table8"):
 
 
 @pytest.mark.parametrize(
-    ("numbers", "largest_angle", "offset"), [(TEN, 1.0, 7.6), (range(1, 13), 1.6, 8.4)]
+    ("numbers", "largest_angle", "offset"), [(TEN, 0.85, 7.6), (range(1, 13), 1.5, 8.4)]
 )
 def test_all_contacts_find_the_axis_and_the_sensors_common_offset(numbers, largest_angle, offset):
     """theory.md row 12: 0.75 deg for the ten with the offset as a nuisance, 5.85 deg without."""
@@ -50,24 +50,23 @@ def test_the_ten_have_the_truth_inside_their_uncertainty():
     assert offset_at(result.axis, true_axis("table8"), here) < result.offset_95
 
 
-def test_three_contacts_succeed_in_three_quarters_of_the_triples():
-    """The rank test of the paper turns 3-5 % of these 120 triples into a right axis."""
-    results = {numbers: estimate(numbers) for numbers in combinations(TEN, 3)}
-    success = [a < 10.0 and d < 0.3 for a, d in map(errors, results.values())]
+@pytest.mark.parametrize(("contacts", "count", "success"), [(3, 120, 0.8), (4, 210, 0.93)])
+def test_most_triples_and_quadruples_succeed(contacts, count, success):
+    """The rank test of the paper turns 3-5 % of the 120 triples into a right axis."""
+    results = {numbers: estimate(numbers) for numbers in combinations(TEN, contacts)}
     right = [r.labellings[0][0] == true_labelling("table8", n) for n, r in results.items()]
     sure = [ok for r, ok in zip(results.values(), right, strict=True) if r.labellings[0][1] > 0.9]
-    assert len(success) == 120
-    assert np.mean(success) >= 0.75
-    assert np.mean(right) >= 0.9
-    assert np.mean(sure) >= 0.95  # "P > 0.9" is kept
+    assert len(results) == count
+    assert np.mean([near(r) for r in results.values()]) >= success
+    assert np.mean(sure) >= 0.98  # "P > 0.9" is kept
+    determined = [near(r) for r in results.values() if r.verdict == "determined"]
+    assert len(determined) >= 0.6 * count
+    assert np.mean(determined) >= 0.93
 
 
-def test_a_determined_triple_is_seldom_wrong():
-    results = [estimate(numbers) for numbers in combinations(TEN, 3)]
-    determined = [r for r in results if r.verdict == "determined"]
-    success = [a < 10.0 and d < 0.3 for a, d in map(errors, determined)]
-    assert len(determined) >= 50
-    assert np.mean(success) >= 0.85
+def near(result):
+    angle, distance = errors(result)
+    return angle < 10.0 and distance < 0.3
 
 
 def test_table_7_is_solved_with_its_own_offset_of_the_other_sign():
@@ -75,5 +74,5 @@ def test_table_7_is_solved_with_its_own_offset_of_the_other_sign():
     result = estimate((1, 2, 3), "table7")
     angle, _ = errors(result, "table7")
     assert result.labellings[0][0] == true_labelling("table7")
-    assert angle < 7.3  # the paper's own
+    assert angle < 5.0  # the paper's own estimate is 7.3 off
     assert np.rad2deg(result.best.direction_offset) < -2.0
