@@ -12,9 +12,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
-import os
 import sys
-import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -24,6 +22,7 @@ from pathlib import Path
 import numpy as np
 from benchmark_problems import ARCS, BATCH, CONTESTANTS, OBJECTS, OURS, Setting, draw_problems
 from benchmark_scores import FAR_DEG, Figures, Interval, Scores, figures_of, joined, score_all
+from output_files import write_whole
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import track
@@ -192,21 +191,8 @@ def _written(options: Options, figures: list[Figures], speed: Speed) -> int:
         "speed": asdict(speed),
     }
     try:
-        _write(options.out, json.dumps(document, indent=1, allow_nan=False))
+        write_whole(options.out, (json.dumps(document, indent=1, allow_nan=False) + "\n").encode())
     except OSError as error:
         print(f"benchmark: --out {options.out}: cannot be written ({error})", file=sys.stderr)
         return 2
     return 0
-
-
-def _write(path: Path, text: str) -> None:
-    """Whole or not at all."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text + "\n")
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise

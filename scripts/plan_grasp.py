@@ -17,11 +17,8 @@ Examples:
 
 from __future__ import annotations
 
-import contextlib
 import json
-import os
 import sys
-import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -30,6 +27,7 @@ import numpy as np
 import pinocchio as pin
 import tyro
 from grasp_report import episode_of, print_round
+from output_files import require_writable, write_whole
 from rich.console import Console
 
 from estimator.axis import Axis, angle_between, offset_at
@@ -103,7 +101,7 @@ def main() -> int:
     console = Console()
     try:
         scenario = _scenario(options)
-        _require_writable(options.out)
+        require_writable(options.out)
     except (ValueError, HandError) as error:
         print(f"plan_grasp: {error}", file=sys.stderr)
         return 2
@@ -159,16 +157,6 @@ def _planner_options(options: Options) -> PlannerOptions:
     workspace = Workspace(X_WB, 1e-3 * options.wrist_range_mm, np.pi)
     reach = replace(PlannerOptions().reach, workspace=workspace)
     return PlannerOptions(reach=reach)
-
-
-def _require_writable(folder: Path) -> None:
-    """Before the work, not after it; nothing is created yet."""
-    existing = next(p for p in (folder, *folder.absolute().parents) if p.exists())
-    try:
-        with tempfile.TemporaryFile(dir=existing):
-            pass
-    except OSError as error:
-        raise ValueError(f"--out {folder}: cannot be written ({error.strerror})") from None
 
 
 def _rounds(scenario: Scenario, options: Options, console: Console) -> Iterator[Step]:
@@ -233,8 +221,8 @@ def _conclude(
             words = f"{error['angle_deg']:.2f} deg and {error['offset_mm']:.2f} mm from the truth"
             episode = episode_of(scenario.surface, scenario.world, steps, words)
             write_page(options.out / "probes.html", scenario.hand, episode)
-        _write(options.out / "plan.json", plans)
-        _write(options.out / "result.json", told)
+        write_whole(options.out / "plan.json", f"{plans}\n".encode())
+        write_whole(options.out / "result.json", f"{told}\n".encode())
     except OSError as failure:
         print(f"plan_grasp: {options.out}: cannot be written ({failure})", file=sys.stderr)
         return 2
@@ -248,20 +236,6 @@ def _conclude(
 
 def _middle(surface: SurfaceOfRevolution) -> np.ndarray:
     return surface.axis.point + np.mean(surface.profile.z_range) * surface.axis.direction
-
-
-def _write(path: Path, text: str) -> None:
-    """Whole or not at all."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text + "\n")
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            os.unlink(temporary)
-        raise
 
 
 if __name__ == "__main__":
