@@ -100,11 +100,15 @@ def _fill(
     most = most_seeds(n) + extra.shape[1]
     seeds, starts = np.zeros((most, 6)), np.zeros((most, D))
     costs, order = np.zeros(most), np.zeros(most, dtype=np.intp)
+    # far from a peak every contact looks grossly wrong, and nothing would pull
+    trusting = Background(
+        background.lines, background.informed, background.misses, background.slope, 0.0
+    )
     rough, rough_cost = np.zeros((MOST_PEAKS, D)), np.zeros(MOST_PEAKS)
     for s in range(readings.shape[0]):
         count = seed_lines(readings, background, extra, s, seeds)
         _start(readings, nuisances, background, s, seeds, count, starts, costs, work)
-        count = _first_steps(readings, nuisances, background, s, starts, costs, count, order, work)
+        count = _first_steps(readings, nuisances, trusting, s, starts, costs, count, order, work)
         found, least = 0, costs[order[0]]
         for k in range(count):
             x = starts[order[k]]
