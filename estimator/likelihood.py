@@ -40,7 +40,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from estimator.compiled import V3, along, compiled, cross3, dot, scaled
+from estimator.compiled import V3, along, compiled, cross3, dot, scaled, vector
 from estimator.readings import (
     CENSORED,
     CONVEX,
@@ -97,11 +97,6 @@ class Fit(NamedTuple):
     K: float
     width: float  # variance of the third residual before whitening
     log_density: float
-
-
-@compiled
-def vector(row: Array, first: int) -> V3:
-    return (row[first], row[first + 1], row[first + 2])
 
 
 @compiled

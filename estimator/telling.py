@@ -19,8 +19,9 @@ from estimator.axis import Axis
 from estimator.contact import Contact
 from estimator.estimate import Hypothesis, TellingContact
 from estimator.modes import Modes, find_modes
+from estimator.nuisances import Owner
 from estimator.prior import AxisPrior
-from estimator.problem import Owner, background_of, nuisance_states, nuisances_of
+from estimator.problem import pose_problems
 from estimator.readings import Readings, exact_readings, readings_of
 from estimator.smooth import surface_through
 from estimator.surface import Geometry
@@ -124,15 +125,9 @@ def _after(
     """Were axis `right` right: its log odds after touching each place, and what that is worth."""
     readings = _with_one_more(contacts, surface_through(axes[right], contacts, places.p))
     owners = [Owner(c.noise, c.finger, c.sensor) for c in (*contacts, contacts[-1])]
-    background = background_of(
-        readings,
-        [] if prior is None else [prior],
-        (),
-        slope=assumptions.sine_of_slope,
-        gross=assumptions.gross(len(owners)),
-    )
-    states = nuisance_states(owners, assumptions)
-    modes = find_modes(readings, nuisances_of(owners, states), background)
+    priors = [] if prior is None else [prior]
+    problems, _ = pose_problems(readings, owners, priors=priors, assumptions=assumptions)
+    modes = find_modes(problems)
     p = np.array([c.position for c in contacts])
     findings = judge(readings, modes, np.full(len(readings), _spread(p)))
     P = np.sum(modes.probability * (_nearest(modes, axes, p) == right), axis=1)
