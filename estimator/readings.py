@@ -26,17 +26,10 @@ CONCAVE = 2.0  # sd by which both curvatures must be negative before a contact c
 
 
 # columns of a contact
-POSITION, NORMAL, K0, K1, KAPPA, CENSORED = 0, 3, 6, 9, 12, 14
-EDGE, CONVEX, VOID = 16, 17, 18
-SD_POSITION, SD_NORMAL, SD_DIRECTION, SD_K_TZ, SD_K_TT, SD_SHARE, SD_COMMON = (
-    19,
-    20,
-    21,
-    22,
-    23,
-    24,
-    25,
-)
+POSITION, NORMAL, K0, K1 = 0, 3, 6, 9
+KAPPA, CENSORED, EDGE, CONVEX, VOID = 12, 14, 16, 17, 18
+SD_POSITION, SD_NORMAL, SD_DIRECTION = 19, 20, 21
+SD_K_TZ, SD_K_TT, SD_SHARE, SD_COMMON = 22, 23, 24, 25
 COLUMNS = 26
 
 Readings = Array
