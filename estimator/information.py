@@ -10,20 +10,15 @@ import numpy as np
 from estimator.assumptions import Assumptions
 from estimator.compiled import across, compiled, vector
 from estimator.contact import SensorNoise
-from estimator.likelihood import (
-    LOCAL,
-    fill_derivatives,
-    fill_motions,
-    fit_of,
-    seen_from,
-)
+from estimator.likelihood import fill_derivatives, fit_of
 from estimator.modes import find_modes
 from estimator.nuisances import Owner
 from estimator.posterior import cost_at
 from estimator.prior import AxisPrior
 from estimator.problem import Problems, pose_problems, problem_at
-from estimator.readings import Readings, exact_readings
+from estimator.readings import ERRORS, Readings, exact_readings
 from estimator.search import DRAMATICALLY_WORSE
+from estimator.sight import LOCAL, fill_motions, seen_from
 from estimator.surface import Geometry
 from estimator.vectors import Array
 from estimator.work import work_space
@@ -55,7 +50,7 @@ def contact_information(
 @compiled
 def _fill_information(readings: Readings, lines: Array, out: Array) -> None:
     gradient, fisher = np.zeros(LOCAL), np.zeros((LOCAL, LOCAL))
-    rows = np.zeros((8, LOCAL))
+    rows, lean = np.zeros((8, LOCAL)), np.zeros((3, ERRORS))
     for s in range(readings.shape[0]):
         a, u = vector(lines[s], 0), vector(lines[s], 3)
         E1, E2 = across(u)
@@ -63,8 +58,8 @@ def _fill_information(readings: Readings, lines: Array, out: Array) -> None:
             row = readings[s, i]
             seen = seen_from(row, a, u, (0.0, 0.0, 0.0), 0.0)
             fill_motions(seen, E1, E2, rows, WITH_ROTATION)
-            fit = fit_of(row, seen, 0.0)
-            fill_derivatives(row, seen, fit, 1.0, 0.0, gradient, fisher, rows, WITH_ROTATION)
+            fit = fit_of(row, seen, 0.0, lean)
+            fill_derivatives(row, seen, fit, 1.0, 0.0, lean, gradient, fisher, rows, WITH_ROTATION)
             for j in range(WITH_ROTATION):
                 for k in range(j + 1):
                     out[s, i, j, k] = fisher[j, k]

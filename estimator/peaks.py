@@ -9,12 +9,12 @@ import numpy as np
 
 from estimator.chart import line_of, separation
 from estimator.compiled import across, compiled
-from estimator.likelihood import LOCAL, THETA, fill_motions, seen_from
 from estimator.linear import factor, inverse, marginal
 from estimator.posterior import contacts_cost, cost_at
 from estimator.problem import Problem, place, spread_of, states_of
 from estimator.readings import VOID
 from estimator.search import SAME_AXIS
+from estimator.sight import LOCAL, THETA, fill_motions, seen_from
 from estimator.vectors import Array, Index
 from estimator.work import Work
 

@@ -9,18 +9,12 @@ from __future__ import annotations
 from estimator.background_terms import background_cost
 from estimator.chart import line_of
 from estimator.compiled import across, compiled
-from estimator.likelihood import (
-    LOCAL,
-    Fit,
-    add_constraints,
-    fill_derivatives,
-    fill_motions,
-    fit_of,
-    gross_errors,
-    seen_from,
-)
+from estimator.gross import gross_errors
+from estimator.likelihood import Fit, fill_derivatives, fit_of
 from estimator.problem import Problem, place, states_of
 from estimator.readings import VOID
+from estimator.shape_terms import add_constraints
+from estimator.sight import LOCAL, fill_motions, seen_from
 from estimator.vectors import Array
 from estimator.work import Work
 
@@ -38,17 +32,17 @@ def contacts_cost(problem: Problem, x: Array, derivatives: bool, work: Work) -> 
         delta, scale, bias = states_of(problem, i, x)
         row = problem.contacts[i]
         seen = seen_from(row, a, u, bias, delta)
-        fit = fit_of(row, seen, scale)
+        fit = fit_of(row, seen, scale, work.lean)
         density, trust, normal_only = fit.log_density, 1.0, 0.0
         if problem.gross > 0.0:
-            density, trust, normal_only = gross_errors(row, seen, fit, problem.gross)
+            density, trust, normal_only = gross_errors(row, fit, problem.gross)
         cost -= density
         work.right[i] = trust
         _add_to_tally(row, fit, trust, normal_only, work.tally)
         if derivatives:
             fill_motions(seen, basis[0], basis[1], work.rows, locals_)
             fill_derivatives(
-                row, seen, fit, trust, normal_only,
+                row, seen, fit, trust, normal_only, work.lean,
                 work.local_gradient, work.local_fisher, work.rows, locals_,
             )  # fmt: skip
         cost += add_constraints(

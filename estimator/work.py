@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from estimator.compiled import compiled
-from estimator.likelihood import LOCAL
+from estimator.readings import ERRORS
+from estimator.sight import LOCAL
 from estimator.vectors import Array
 
 
@@ -21,6 +22,7 @@ class Work(NamedTuple):
     local_gradient: Array  # (9,)
     local_fisher: Array  # (9, 9)
     rows: Array  # (8, 9)
+    lean: Array  # (3, 8)
     chart: Array  # (4, 4)
     lifted: Array  # (P, P)
     step: Array  # (P,)
@@ -38,6 +40,7 @@ def work_space(parameters: int, contacts: int) -> Work:
         np.zeros(LOCAL),
         np.zeros((LOCAL, LOCAL)),
         np.zeros((8, LOCAL)),
+        np.zeros((3, ERRORS)),
         np.zeros((4, 4)),
         np.zeros((parameters, parameters)),
         np.zeros(parameters),
