@@ -59,7 +59,7 @@ def estimate_axis(
         ValueError: Fewer than two contacts, or two at one point.
     """
     require_distinct(contacts, minimum=2 if prior is None else 0)
-    readings = readings_of(contacts)
+    readings = readings_of(contacts, assumptions.rough)
     owners = [Owner(c.noise, c.finger, c.sensor) for c in contacts]
     priors = [] if prior is None else [prior]
     problems, states = pose_problems(
@@ -95,7 +95,7 @@ def estimate_axes(
         raise ValueError(f"contacts: at least 2 are needed in each set, got {n}")
     if len(priors) not in (0, 1, len(sets)):
         raise ValueError(f"prior: expected one or {len(sets)}, got {len(priors)}")
-    readings = readings_of_sets(sets)
+    readings = readings_of_sets(sets, assumptions.rough)
     owners = [Owner(sets.noise, finger, sensor) for finger, sensor in sets.owners]
     problems, states = pose_problems(readings, owners, priors=priors, assumptions=assumptions)
     modes = _modes(problems)

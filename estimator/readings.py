@@ -10,11 +10,13 @@ eight touches of a sphere must not pass because one of them is lucky.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
 from scipy.special import chdtrc
 
+from estimator.assumptions import SMOOTH, Roughness
 from estimator.batches import ContactSets
 from estimator.contact import Contact, SensorNoise
 from estimator.surface import Geometry
@@ -55,27 +57,49 @@ _HALVED = np.eye(ERRORS)  # K_xx and K_yy of `LocalSurface` to their half sum an
 _HALVED[_MEAN, 5:7], _HALVED[_HALF, 5:7] = (0.5, 0.5), (0.5, -0.5)
 
 
-def readings_of(contacts: Sequence[Contact]) -> Readings:
+def readings_of(contacts: Sequence[Contact], rough: Roughness = SMOOTH) -> Readings:
     """One set of contacts; an empty one has shape (1, 0)."""
     n = len(contacts)
-    covariances = [c.covariance for c in contacts]
     return stacked_readings(
         np.array([c.position for c in contacts]).reshape(1, n, 3),
         np.array([c.normal for c in contacts]).reshape(1, n, 3),
         np.array([c.directions for c in contacts]).reshape(1, n, 2, 3),
         np.array([c.curvatures for c in contacts]).reshape(1, n, 2),
-        [c.noise for c in contacts],
-        {i: C for i, C in enumerate(covariances) if C is not None},
+        [_rougher(c.noise, rough) for c in contacts],
+        {
+            i: c.covariance + _error_of(rough)
+            for i, c in enumerate(contacts)
+            if c.covariance is not None
+        },
     )
 
 
-def readings_of_sets(sets: ContactSets) -> Readings:
+def readings_of_sets(sets: ContactSets, rough: Roughness = SMOOTH) -> Readings:
     """Many sets of contacts."""
-    n = sets.positions.shape[1]
-    measured = {} if sets.covariances is None else {i: sets.covariances[:, i] for i in range(n)}
+    n, C = sets.positions.shape[1], sets.covariances
+    measured = {} if C is None else {i: C[:, i] + _error_of(rough) for i in range(n)}
+    noise = [_rougher(sets.noise, rough)] * n
     return stacked_readings(
-        sets.positions, sets.normals, sets.directions, sets.curvatures, [sets.noise] * n, measured
+        sets.positions, sets.normals, sets.directions, sets.curvatures, noise, measured
     )
+
+
+def _rougher(noise: SensorNoise, rough: Roughness) -> SensorNoise:
+    """What a sensor's reading of a rough surface errs."""
+    if rough == SMOOTH:
+        return noise
+    return replace(
+        noise,
+        normal=float(np.hypot(noise.normal, rough.normal)),
+        deviator=float(np.hypot(noise.deviator, rough.curvature)),
+        mean_curvature=float(np.hypot(noise.mean_curvature, rough.curvature)),
+    )
+
+
+def _error_of(rough: Roughness) -> Array:
+    """Covariance of the eight errors, (8, 8)."""
+    bent = rough.curvature**2
+    return np.diag([0.0, 0.0, 0.0, rough.normal**2, rough.normal**2, 2 * bent, 2 * bent, bent])
 
 
 def exact_readings(geometry: Geometry, noise: SensorNoise) -> Readings:

@@ -14,7 +14,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 
-from estimator.assumptions import Assumptions
+from estimator.assumptions import Assumptions, Roughness
 from estimator.axis import Axis
 from estimator.contact import Contact
 from estimator.estimate import Hypothesis, TellingContact
@@ -123,7 +123,9 @@ def _after(
     assumptions: Assumptions,
 ) -> tuple[Array, Array]:
     """Were axis `right` right: its log odds after touching each place, and what that is worth."""
-    readings = _with_one_more(contacts, surface_through(axes[right], contacts, places.p))
+    readings = _with_one_more(
+        contacts, surface_through(axes[right], contacts, places.p), assumptions.rough
+    )
     owners = [Owner(c.noise, c.finger, c.sensor) for c in (*contacts, contacts[-1])]
     priors = [] if prior is None else [prior]
     problems, _ = pose_problems(readings, owners, priors=priors, assumptions=assumptions)
@@ -139,13 +141,15 @@ def _after(
     return log_odds, worth - PLAIN * (findings.verdict == UNDETERMINED)
 
 
-def _with_one_more(contacts: Sequence[Contact], felt: Geometry) -> Readings:
+def _with_one_more(contacts: Sequence[Contact], felt: Geometry, rough: Roughness) -> Readings:
     """The contacts with one of G places added, (G, n + 1, columns)."""
     noise = contacts[-1].noise
     k0, k1 = (np.where(np.abs(k) < noise.flat, np.nan, k) for k in (felt.kappa_theta, felt.kappa_z))
     felt = _mapped(replace(felt, kappa_theta=k0, kappa_z=k1), np.s_[:, None])
     last = exact_readings(felt, noise)
-    return np.concatenate([np.repeat(readings_of(contacts), len(last), axis=0), last], axis=1)
+    return np.concatenate(
+        [np.repeat(readings_of(contacts, rough), len(last), axis=0), last], axis=1
+    )
 
 
 def _nearest(modes: Modes, axes: Sequence[Axis], p: Array) -> Index:
