@@ -147,29 +147,32 @@ def _model(
 
 
 def _table_fit(probing: Probing, kind: str, probe: Probe, reach: float) -> ResponseFit:
-    """Van Cittert's sharpening: add what the probe's image of the table lacks, a few times."""
+    """Every tactel's patch of the grid, all cut to one size."""
     patches = [probing.around(t, reach) for t in range(len(probing.positions))]
-    shape = tuple(min(p[2].shape[axis] for p in patches) for axis in (0, 1))
-    models, rms = [], []
-    for (x, y, measured), place in zip(patches, probing.positions, strict=True):
-        x, y, data = x[: shape[0]], y[: shape[1]], measured[: shape[0], : shape[1]]
-        points = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
-        sharp = data.copy()
-
-        def tabulated(samples: Array, kind: str, first=(x[0], y[0])) -> ResponseModel:
-            return table(
-                np.zeros((1, 2)), origins=first, steps=probing.steps, samples=samples[None],
-                kind=kind,
-            )  # fmt: skip
-
-        for _ in range(SHARPENINGS if probe.radius > 0.0 else 0):
-            image = probe.response(tabulated(sharp, "cubic"), points)[:, 0]
-            sharp += data - image.reshape(data.shape)
-        model = tabulated(sharp, kind)
-        left = probe.response(model, points)[:, 0] - data.ravel()
-        models.append(ResponseModel(model.kind, model.rows, place[None]))
+    n_x, n_y = (min(p[2].shape[axis] for p in patches) for axis in (0, 1))
+    rows, rms = [], []
+    for x, y, data in patches:
+        model, left = _sharpened(x[:n_x], y[:n_y], data[:n_x, :n_y], probing.steps, kind, probe)
+        rows.append(model.rows[0])
         rms.append(np.sqrt(np.mean(left**2)) / probing.full_scale)
-    rows = np.concatenate([m.rows for m in models])
-    model = ResponseModel(models[0].kind, rows, probing.positions)
+    whole = ResponseModel(model.kind, np.stack(rows), probing.positions)
     nothing = np.empty((len(rows), 0))
-    return ResponseFit(model, frozen(rms), (), frozen(nothing), frozen(nothing[..., None]))
+    return ResponseFit(whole, frozen(rms), (), frozen(nothing), frozen(nothing[..., None]))
+
+
+def _sharpened(
+    x: Array, y: Array, data: Array, steps: tuple[float, float], kind: str, probe: Probe
+) -> tuple[ResponseModel, Array]:
+    """Van Cittert: add what the probe's image of the table lacks, a few times. And what is left."""
+    points = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+
+    def tabulated(samples: Array, kind: str) -> ResponseModel:
+        first = (float(x[0]), float(y[0]))
+        return table(np.zeros((1, 2)), origins=first, steps=steps, samples=samples[None], kind=kind)
+
+    sharp = data.copy()
+    for _ in range(SHARPENINGS if probe.radius > 0.0 else 0):
+        image = probe.response(tabulated(sharp, "cubic"), points)[:, 0]
+        sharp += data - image.reshape(data.shape)
+    model = tabulated(sharp, kind)
+    return model, probe.response(model, points)[:, 0] - data.ravel()
