@@ -150,7 +150,7 @@ class TactelSession:
         )  # fmt: skip
         axes = np.linalg.eigvalsh(ellipse)
         return Touches(
-            self._electronics(clean, exact, rng),
+            self.electronics(clean, rng=None if exact else rng),
             frozen(ellipse),
             frozen(indentation(axes[:, 1], axes[:, 0], forces / modulus, 1.0)),
             conforming,
@@ -171,10 +171,17 @@ class TactelSession:
         waves = np.cos(2.0 * np.pi * (places - self.array.positions[0]) / pitches)
         return np.asarray(1.0 + self.imperfections.band_stiffness * waves.mean(axis=1))
 
-    def _electronics(self, clean: Array, exact: bool, rng: np.random.Generator) -> Array:
-        """Noise, rounding, dead tactels: (B, rows, columns)."""
+    def electronics(self, clean: Array, *, rng: np.random.Generator | None) -> Array:
+        """What is recorded of clean readings (B, T): noise, rounding, dead tactels.
+
+        Args:
+            clean: As the rubber has it.
+            rng: Of the noise; without it neither noise nor rounding.
+        Returns:
+            (B, rows, columns).
+        """
         array, readings = self.array, clean
-        if not exact:
+        if rng is not None:
             peak = np.abs(clean).max(axis=1, keepdims=True)
             sd = np.sqrt(array.noise**2 + (array.response_error * peak) ** 2)
             readings = clean * (1.0 + array.gain_noise * rng.standard_normal(clean.shape))
