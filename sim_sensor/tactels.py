@@ -20,64 +20,10 @@ from estimator.response import POINT_LOAD, ResponseModel
 from estimator.response_models import altered
 from estimator.strain_array import StrainArray
 from estimator.vectors import Array, Mask, frozen
+from sim_sensor.tactel_imperfections import StrainImperfections
 from sim_sensor.tactel_sums import pressed_readings
 
 FLATTEST = 1.0  # relative curvature below which bodies lie on each other, no Hertz contact [1/m]
-
-
-@dataclass(frozen=True)
-class StrainImperfections:
-    """How the true finger differs from the `StrainArray` a reader is told; by default it does not.
-
-    Args:
-        modulus: True over stated modulus of the Hertz contact; the paper's .40/.25 is 1.6.
-        depth: True over stated depth.
-        gain: Common true gain.
-        gain_spread: Sd of each tactel's gain.
-        jitter: Sd of each tactel's place, both ways [m].
-        band_shift: Sd of the place of each copper band, rings along x, lengthwise ones along y [m].
-        band_skew: Slope of the lengthwise bands, dy/dx [rad].
-        band_stiffness: The rubber adheres to the bands: relative modulus from 1 + s above a tactel
-            to 1 - s between, so that what is read depends on where the body touches.
-        turn: Of the finger about the touched normal against the stated frame [rad].
-        turn_spread, gain_error: Sd of `turn` [rad] and of log `gain`, once a session.
-        friction: Tangential over normal force; across a random direction at each touch.
-        dead: Row and column of tactels that read zero.
-        ceiling: Readings clip here [unit of the array].
-    Raises:
-        ValueError: Negative spreads, factors not positive.
-    """
-
-    modulus: float = 1.0
-    depth: float = 1.0
-    gain: float = 1.0
-    gain_spread: float = 0.0
-    jitter: float = 0.0
-    band_shift: float = 0.0
-    band_skew: float = 0.0
-    band_stiffness: float = 0.0
-    turn: float = 0.0
-    turn_spread: float = 0.0
-    gain_error: float = 0.0
-    friction: float = 0.0
-    dead: tuple[tuple[int, int], ...] = ()
-    ceiling: float = float("inf")
-
-    def __post_init__(self) -> None:
-        for name in ("modulus", "depth", "gain", "ceiling"):
-            if not getattr(self, name) > 0.0:
-                raise ValueError(f"{name}: expected greater than zero, got {getattr(self, name)}")
-        spreads = ("gain_spread", "jitter", "band_shift", "turn_spread", "gain_error", "friction")
-        for name in spreads:
-            if not getattr(self, name) >= 0.0:
-                raise ValueError(f"{name}: expected zero or more, got {getattr(self, name)}")
-        if not 0.0 <= self.band_stiffness < 1.0:
-            raise ValueError(f"band_stiffness: expected 0 to 1, got {self.band_stiffness}")
-
-
-ORDINARY = StrainImperfections(
-    gain_spread=0.005, jitter=0.02e-3, turn_spread=float(np.deg2rad(0.5)), gain_error=0.005
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,7 +126,7 @@ class TactelSession:
         Returns:
             (B, rows, columns).
         """
-        array, readings = self.array, clean
+        array, wrong, readings = self.array, self.imperfections, clean
         if rng is not None:
             peak = np.abs(clean).max(axis=1, keepdims=True)
             sd = np.sqrt(array.noise**2 + (array.response_error * peak) ** 2)
@@ -188,9 +134,10 @@ class TactelSession:
             readings = readings + sd * rng.standard_normal(clean.shape)
             step = 2.0 * array.rounding
             readings = step * np.round(readings / step) if step > 0.0 else readings
-        readings = np.minimum(readings, self.imperfections.ceiling).reshape(-1, *array.tactels)
-        for row, column in self.imperfections.dead:
-            readings[:, row, column] = 0.0
+        readings = np.minimum(readings, wrong.ceiling).reshape(-1, *array.tactels)
+        for tactels, value in ((wrong.stuck, 0.0), (wrong.dead, np.nan)):
+            for row, column in tactels:
+                readings[:, row, column] = value
         return frozen(readings)
 
 
@@ -218,7 +165,7 @@ class StrainFinger:
         if model is not None and model.kind != POINT_LOAD and self.imperfections.friction > 0.0:
             raise ValueError("friction: only the half space knows tangential loads; use boussinesq")
         rows, columns = self.array.tactels
-        for row, column in self.imperfections.dead:
+        for row, column in (*self.imperfections.dead, *self.imperfections.stuck):
             if not (0 <= row < rows and 0 <= column < columns):
                 raise ValueError(f"dead tactel {(row, column)}: expected one of {rows} x {columns}")
 

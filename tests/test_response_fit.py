@@ -8,7 +8,8 @@ from estimator.response_fit import fit_response
 from estimator.response_models import separable
 from estimator.strain_array import StrainArray
 from sim_sensor.probing import Campaign, probe_finger
-from sim_sensor.tactels import StrainFinger, StrainImperfections
+from sim_sensor.tactel_imperfections import StrainImperfections
+from sim_sensor.tactels import StrainFinger
 
 PAIR = [27, 28]  # tactels in the middle of 8 x 8
 WIDE = Probe(1e-3, "flat")

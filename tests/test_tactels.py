@@ -6,7 +6,8 @@ import pytest
 from estimator.hertz import contact_ellipse
 from estimator.response_models import separable
 from estimator.strain_array import StrainArray, taxel_array
-from sim_sensor.tactels import ORDINARY, StrainFinger, StrainImperfections
+from sim_sensor.tactel_imperfections import ORDINARY, StrainImperfections
+from sim_sensor.tactels import StrainFinger
 
 CENTRE = [[0.0, 0.0]]
 SMALL = StrainArray(tactels=(4, 4))
@@ -178,14 +179,15 @@ def test_readings_are_rounded_noisy_and_clipped_as_stated():
     assert readings.max() == pytest.approx(0.02)
 
 
-def test_dead_tactel_reads_zero_and_the_others_as_before():
+@pytest.mark.parametrize(("how", "value"), [("stuck", 0.0), ("dead", np.nan)])
+def test_stuck_tactel_reads_zero_and_a_dead_one_nothing_the_others_as_before(how, value):
     tensor = body(25.4, 177.8, 90.0)
     whole = pressed(session(), tensor).readings[0]
-    dead = pressed(session(dead=((1, 2),)), tensor).readings[0]
+    found = pressed(session(**{how: ((1, 2),)}), tensor).readings[0]
     alive = np.ones((4, 4), bool)
     alive[1, 2] = False
-    assert dead[1, 2] == 0.0
-    np.testing.assert_array_equal(dead[alive], whole[alive])
+    np.testing.assert_equal(found[1, 2], value)
+    np.testing.assert_array_equal(found[alive], whole[alive])
 
 
 def test_another_response_model_generates_by_itself():
