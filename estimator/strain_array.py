@@ -8,6 +8,7 @@ taxels on a flat pad the same with an infinite radius and another kernel.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -124,17 +125,11 @@ class StrainArray:
     @property
     def positions(self) -> Array:
         """Of all tactels, x and y = r theta [m], shape (rows * columns, 2), x fastest."""
-        rows, columns = self.tactels
-        y = (np.arange(rows) - 0.5 * (rows - 1)) * self.arc_pitch
-        x = (np.arange(columns) - 0.5 * (columns - 1)) * self.axial_pitch
-        return frozen(np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2))
+        return _positions(self)
 
     def response(self) -> ResponseModel:
         """The nominal impulse response: of a half space, the same for all tactels."""
-        if self.measures == "pressure":
-            cell = self.axial_pitch * self.arc_pitch
-            return pressure(self.positions, depth=self.depth, gain=cell)
-        return boussinesq(self.positions, depth=self.depth, poisson=self.poisson)
+        return _response(self)
 
     def standard_deviation(self, readings: Array) -> Array:
         """Of the error of each tactel, from the readings themselves, (..., rows, columns)."""
@@ -142,6 +137,22 @@ class StrainArray:
         variance = self.rounding**2 / 3.0 + self.noise**2
         proportional = (self.gain_noise * readings) ** 2 + (self.response_error * peak) ** 2
         return np.asarray(np.sqrt(variance + proportional))
+
+
+@lru_cache(maxsize=16)
+def _positions(array: StrainArray) -> Array:
+    rows, columns = array.tactels
+    y = (np.arange(rows) - 0.5 * (rows - 1)) * array.arc_pitch
+    x = (np.arange(columns) - 0.5 * (columns - 1)) * array.axial_pitch
+    return frozen(np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2))
+
+
+@lru_cache(maxsize=16)
+def _response(array: StrainArray) -> ResponseModel:
+    if array.measures == "pressure":
+        cell = array.axial_pitch * array.arc_pitch
+        return pressure(array.positions, depth=array.depth, gain=cell)
+    return boussinesq(array.positions, depth=array.depth, poisson=array.poisson)
 
 
 def taxel_array(

@@ -1,10 +1,13 @@
 """What the tactels read under a Hertz contact: the impulse response under the contact's pressure.
 
-    eps_t = compliance F  integral over the ellipse of p(u) h_t(x_0 + M u - x_t) du,
+    eps_t = compliance F  integral over the unit disk of p(u) h_t(x_0 + M u - x_t) du,
 
-the pressure p ~ sqrt(1 - |u|^2) of Hertz, by a disk rule: Gauss-Jacobi in |u|^2, equispaced angles
-staggered from ring to ring. Long ellipses need more nodes: too few bias the inverse. The integral
-is taken on the skin rolled out flat (y = r_f theta), sensor.md: "wrapped half space".
+with Hertz's pressure p ~ sqrt(1 - |u|^2). The disk is cut along the ellipse's long axis: with
+u = (s, sqrt(1 - s^2) t) the weight falls apart into (1 - s^2) and sqrt(1 - t^2), each with its own
+Gauss rule. An integrand with poles a depth d away, seen from a half axis a, loses a factor rho^2
+by each node, rho = d/a + sqrt(1 + (d/a)^2): so many nodes are taken as the digits asked for need,
+and a long thin ellipse needs few across. (Too few along it bias the inverse.) The integral is over
+the skin rolled out flat, y = r_f theta: the "wrapped half space" of appendix 7.
 """
 
 from __future__ import annotations
@@ -18,128 +21,131 @@ from estimator.response import POINT_LOAD, ResponseModel, response_at
 from estimator.strain_array import StrainArray
 from estimator.vectors import Array, Index
 
-RULES = ((4, 12), (6, 18), (8, 24), (10, 32), (12, 44))  # rings and nodes on each
-REACH = (1.1, 1.8, 2.5, 3.3)  # up to this a/d the rule serves: 1e-5 of strain
+MOST_NODES = 24  # along one axis: five digits at a = 5 d
+DIGITS = 5.5  # of the peak; a strain finger rounds to two
+Sums = tuple[float, float, float, float, float, float]
 STATE = 6  # x_0, y_0 [m], ln F, K_xx, K_yy, K_xy of the relative curvature [1/m]
 
 
-def disk_rule(rings: int, nodes: int) -> Array:
-    """Rows u_x, u_y, weight: integrates over the unit disk with Hertz's pressure, sum 1."""
-    roots, weights = roots_jacobi(rings, 0.5, 0.0)  # (1 - |u|^2)^(1/2) over |u|^2
-    radius = np.sqrt(0.5 * (1.0 + roots))
-    ring = np.repeat(np.arange(rings), nodes)
-    angle = (np.tile(np.arange(nodes), rings) + 0.5 * (ring % 2)) * (2.0 * np.pi / nodes)
-    weight = np.repeat(weights / weights.sum(), nodes) / nodes
-    return np.stack([radius[ring] * np.cos(angle), radius[ring] * np.sin(angle), weight])
+def _gauss_rules() -> Array:
+    """[0]: along, weight 1 - s^2; [1]: across, sqrt(1 - t^2). (2, n, nodes and weights, n)."""
+    rules = np.zeros((2, MOST_NODES + 1, 2, MOST_NODES))
+    for n in range(1, MOST_NODES + 1):
+        for axis, power in enumerate((1.0, 0.5)):
+            nodes, weights = roots_jacobi(n, power, power)
+            rules[axis, n, 0, :n], rules[axis, n, 1, :n] = nodes, weights / weights.sum()
+    return rules
 
 
-def _stacked() -> tuple[Array, Index]:
-    counts = np.array([r * n for r, n in RULES], dtype=np.intp)
-    nodes = np.zeros((len(RULES), 3, counts.max()))
-    for i, rule in enumerate(RULES):
-        nodes[i, :, : counts[i]] = disk_rule(*rule)
-    return nodes, counts
-
-
-NODES, COUNTS = _stacked()
+GAUSS = _gauss_rules()
 
 
 @compiled
-def rule_for(long_axis: float, depth: float) -> int:
-    """Index of the disk rule good to 1e-5 strain at this semi-axis."""
-    rule = 0
-    for limit in REACH:
-        rule += long_axis > limit * depth
-    return rule
+def nodes_needed(half_axis: float, depth: float, digits: float) -> int:
+    """Of a Gauss rule over this half axis, for a response this deep."""
+    q = depth / half_axis
+    n = int(digits * 1.1513 / np.log(q + (1.0 + q * q) ** 0.5)) + 1  # ln(10) / 2
+    return min(max(n, 2), MOST_NODES)
 
 
 @compiled
-def long_axis(M: Array) -> float:
-    """Larger eigenvalue of M = (M_xx, M_yy, M_xy)."""
-    half = 0.5 * (M[0] - M[1])
-    return 0.5 * (M[0] + M[1]) + (half * half + M[2] * M[2]) ** 0.5
+def disk_nodes(M: Array, depth: float, digits: float, u: Array, p: Array) -> int:
+    """Write nodes u_x, u_y, weight and their places M u on the skin; how many.
+
+    Args:
+        M: (M_xx, M_yy, M_xy) [m].
+        u, p: Out, with room for MOST_NODES^2, (3, N) and (2, N).
+    """
+    half, off = 0.5 * (M[0] - M[1]), M[2]
+    mean, spread = 0.5 * (M[0] + M[1]), (half * half + off * off) ** 0.5
+    angle = 0.5 * np.arctan2(off, half)
+    c, s = np.cos(angle), np.sin(angle)
+    n_a = nodes_needed(mean + spread, depth, digits)
+    n_b = nodes_needed(max(mean - spread, 1e-3 * mean), depth, digits)
+    k = 0
+    for i in range(n_a):
+        along, w = GAUSS[0, n_a, 0, i], GAUSS[0, n_a, 1, i]
+        width = (1.0 - along * along) ** 0.5
+        for j in range(n_b):
+            across = width * GAUSS[1, n_b, 0, j]
+            x, y = c * along - s * across, s * along + c * across
+            u[0, k], u[1, k], u[2, k] = x, y, w * GAUSS[1, n_b, 1, j]
+            p[0, k], p[1, k] = M[0] * x + M[2] * y, M[2] * x + M[1] * y
+            k += 1
+    return k
 
 
 @compiled
-def _point_load_sums(
-    row: Array, x: float, y: float, px: Array, py: Array, nodes: Array, n: int, out: Array
-) -> None:
+def _point_load_sums(rows: Array, t: int, x: float, y: float, p: Array, u: Array, n: int) -> Sums:
     """Weighted sums of h, h_x, h_y, h_x u_x, h_y u_y, h_x u_y + h_y u_x for a half space.
 
     The response's own formula again (`response.response_at`), in a loop that vectorises.
     """
-    c, v, d2 = row[1], row[2], row[3]
+    A, c, v, d2 = rows[t, 0], rows[t, 1], rows[t, 2], rows[t, 3]
     s0, s1, s2, s3, s4, s5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(n):
-        dx, dy = px[k] + x, py[k] + y
+        dx, dy = p[0, k] + x, p[1, k] + y
         r2 = dx * dx + dy * dy
         q = 1.0 / (r2 + d2)
-        weight = nodes[2, k] * q * q * np.sqrt(q)
+        weight = u[2, k] * q * q * np.sqrt(q)
         top = c - v * r2
-        slope = -2.0 * weight * (v + 2.5 * top * q)
+        slope = weight * (v + 2.5 * top * q)
         fx, fy = slope * dx, slope * dy
         s0 += weight * top
         s1 += fx
         s2 += fy
-        s3 += fx * nodes[0, k]
-        s4 += fy * nodes[1, k]
-        s5 += fx * nodes[1, k] + fy * nodes[0, k]
-    A = row[0]
-    out[0], out[1], out[2] = A * s0, A * s1, A * s2
-    out[3], out[4], out[5] = A * s3, A * s4, A * s5
+        s3 += fx * u[0, k]
+        s4 += fy * u[1, k]
+        s5 += fx * u[1, k] + fy * u[0, k]
+    B = -2.0 * A
+    return A * s0, B * s1, B * s2, B * s3, B * s4, B * s5
 
 
 @compiled
-def _any_sums(
-    kind: int, row: Array, x: float, y: float, px: Array, py: Array, nodes: Array, n: int,
-    out: Array,
-) -> None:  # fmt: skip
+def _any_sums(kind: int, row: Array, x: float, y: float, p: Array, u: Array, n: int) -> Sums:
     """The same of any response."""
-    out[:] = 0.0
+    s0, s1, s2, s3, s4, s5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(n):
-        h, fx, fy = response_at(kind, row, px[k] + x, py[k] + y)
-        w = nodes[2, k]
-        out[0] += w * h
-        out[1] += w * fx
-        out[2] += w * fy
-        out[3] += w * fx * nodes[0, k]
-        out[4] += w * fy * nodes[1, k]
-        out[5] += w * (fx * nodes[1, k] + fy * nodes[0, k])
+        h, fx, fy = response_at(kind, row, p[0, k] + x, p[1, k] + y)
+        w = u[2, k]
+        fx, fy = w * fx, w * fy
+        s0 += w * h
+        s1 += fx
+        s2 += fy
+        s3 += fx * u[0, k]
+        s4 += fy * u[1, k]
+        s5 += fx * u[1, k] + fy * u[0, k]
+    return s0, s1, s2, s3, s4, s5
 
 
 @compiled
 def readings_into(
-    state: Array, modulus: float, compliance: float, rule: int, kind: int,
+    state: Array, modulus: float, compliance: float, depth: float, digits: float, kind: int,
     rows: Array, positions: Array, tactels: Index, readings: Array, J: Array, M: Array, M_J: Array,
-    p: Array,
+    u: Array, p: Array,
 ) -> None:  # fmt: skip
     """Write readings of the tactels named and their derivatives over the state.
 
     Args:
         state: x_0, y_0, ln F and the relative curvature, see `STATE`.
         modulus, compliance: E* [Pa]; response to reading [1/N m^2].
-        rule: Index of the disk rule.
+        depth, digits: Of the quadrature.
         kind, rows, positions: Of the response model.
         tactels: Indices into rows and positions, (T,).
         readings, J: Out, (T,) and (T, 6).
         M, M_J: Out, ellipse and its derivatives, (3,) and (3, 4).
-        p: Room for the nodes, (2, N).
+        u, p: Room for the nodes, (3, N) and (2, N).
     """
     ellipse_into(state[3:6], np.exp(state[2]), modulus, M, M_J)
-    nodes, n = NODES[rule], COUNTS[rule]
-    px, py = p[0], p[1]
-    for k in range(n):
-        px[k] = M[0] * nodes[0, k] + M[2] * nodes[1, k]
-        py[k] = M[2] * nodes[0, k] + M[1] * nodes[1, k]
+    n = disk_nodes(M, depth, digits, u, p)
     scale = compliance * np.exp(state[2])
-    s = np.empty(6)
     for i in range(len(tactels)):
         t = tactels[i]
         x, y = state[0] - positions[t, 0], state[1] - positions[t, 1]
         if kind == POINT_LOAD:
-            _point_load_sums(rows[t], x, y, px, py, nodes, n, s)
+            s = _point_load_sums(rows, t, x, y, p, u, n)
         else:
-            _any_sums(kind, rows[t], x, y, px, py, nodes, n, s)
+            s = _any_sums(kind, rows[t], x, y, p, u, n)
         readings[i] = scale * s[0]
         J[i, 0], J[i, 1] = scale * s[1], scale * s[2]
         for j in range(4):
@@ -149,21 +155,18 @@ def readings_into(
 
 @compiled
 def _all_readings(
-    states: Array, modulus: float, compliance: float, depth: float, rule: int, kind: int,
+    states: Array, modulus: float, compliance: float, depth: float, digits: float, kind: int,
     rows: Array, positions: Array, J: Array,
 ) -> Array:  # fmt: skip
     """`readings_into` of every tactel for each state; J (B or 0, T, 6) is filled if it has room."""
     T = len(positions)
     out, slopes, every = np.empty((len(states), T)), np.empty((T, 6)), np.arange(T)
-    M, M_J, p = np.empty(3), np.empty((3, 4)), np.empty((2, NODES.shape[2]))
+    M, M_J = np.empty(3), np.empty((3, 4))
+    u, p = np.empty((3, MOST_NODES**2)), np.empty((2, MOST_NODES**2))
     for i in range(len(states)):
-        chosen = rule
-        if rule < 0:
-            ellipse_into(states[i, 3:6], np.exp(states[i, 2]), modulus, M, M_J)
-            chosen = rule_for(long_axis(M), depth)
         readings_into(
-            states[i], modulus, compliance, chosen, kind, rows, positions, every, out[i], slopes,
-            M, M_J, p,
+            states[i], modulus, compliance, depth, digits, kind, rows, positions, every, out[i],
+            slopes, M, M_J, u, p,
         )  # fmt: skip
         if len(J):
             J[i] = slopes
@@ -191,21 +194,25 @@ def touch_state(places: Array, forces: Array, tensors: Array, array: StrainArray
 
 
 def predicted_readings(
-    states: Array, array: StrainArray, response: ResponseModel | None = None, *, rule: int = -1
+    states: Array,
+    array: StrainArray,
+    response: ResponseModel | None = None,
+    *,
+    digits: float = DIGITS,
 ) -> Array:
     """What every tactel of the array reads without noise, (B, rows, columns) [unit].
 
     Args:
         states: (B, 6), see `touch_state`.
         response: Measured impulse responses of all tactels; by default the half space's.
-        rule: Index of the disk rule, by default the one the ellipse needs.
+        digits: Of the quadrature, relative to the peak.
     """
     model = response or array.response()
     out = _all_readings(
         np.ascontiguousarray(states, dtype=np.float64), array.effective_modulus, array.compliance,
-        array.depth, rule, model.kind, model.rows, model.positions, np.empty((0, 1, 1)),
+        array.depth, digits, model.kind, model.rows, model.positions, np.empty((0, 1, 1)),
     )  # fmt: skip
-    return out.reshape(-1, *array.tactels)
+    return out.reshape(len(states), *array.tactels)
 
 
 def reading_slopes(
@@ -216,6 +223,6 @@ def reading_slopes(
     J = np.empty((len(states), len(model), STATE))
     _all_readings(
         np.ascontiguousarray(states, dtype=np.float64), array.effective_modulus, array.compliance,
-        array.depth, -1, model.kind, model.rows, model.positions, J,
+        array.depth, DIGITS, model.kind, model.rows, model.positions, J,
     )  # fmt: skip
     return J

@@ -1,0 +1,274 @@
+"""Least squares of one window of readings: Levenberg-Marquardt over place, force and curvature.
+
+The state is (x_0, y_0, ln F, K) with K the relative curvature, so the prior on the object's flat
+curvature is one more residual and no elliptic integral is in the loop. The one-curvature algorithm
+moves on the ridge K = flat I + w w' of a given second curvature, w in the plane: two numbers
+without a singular direction.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from estimator.compiled import compiled
+from estimator.strain_model import DIGITS, MOST_NODES, readings_into
+from estimator.vectors import Array, Index
+
+MOST_STEPS = 60
+CONVERGED = 1e-6  # predicted fall of the sum of squares
+ROUGH = 0.3  # until it is this small a rougher quadrature serves
+ROUGH_DIGITS = 2.5
+ROUND = 0.1  # curvatures closer than this count as one in the prior's slope [1/m]
+
+
+class Problem(NamedTuple):
+    """What all windows of a batch have in common; flat tuples, so compiled code takes them whole.
+
+    `material` is E* [Pa], compliance, depth [m], the finger's curvature, and the flat curvature
+    that the one-curvature algorithm assumes [1/m]; `prior` mean and 1/sd of the flat curvature
+    (1/sd = 0: none); `box` the least and largest x_0, y_0 (from the window's middle) and ln F.
+    """
+
+    kind: int
+    rows: Array
+    positions: Array
+    material: tuple[float, float, float, float, float]
+    prior: tuple[float, float]
+    box: Array
+
+
+class Room(NamedTuple):
+    """Where one evaluation leaves its results: readings, slopes, ellipse, J'WJ and J'Wr."""
+
+    model: Array
+    J: Array
+    M: Array
+    M_J: Array
+    u: Array
+    p: Array
+    A: Array
+    g: Array
+
+
+@compiled
+def solve_into(A: Array, g: Array, n: int, damping: float, L: Array, x: Array) -> bool:
+    """x = (A + damping diag A)^-1 g by Cholesky; False if not positive definite."""
+    for i in range(n):
+        for j in range(i + 1):
+            s = A[i, j] * (1.0 + damping) if i == j else A[i, j]
+            for k in range(j):
+                s -= L[i, k] * L[j, k]
+            if i == j:
+                if not s > 0.0:
+                    return False
+                L[i, i] = s**0.5
+            else:
+                L[i, j] = s / L[j, j]
+    for i in range(n):
+        s = g[i]
+        for k in range(i):
+            s -= L[i, k] * x[k]
+        x[i] = s / L[i, i]
+    for i in range(n - 1, -1, -1):
+        s = x[i]
+        for k in range(i + 1, n):
+            s -= L[k, i] * x[k]
+        x[i] = s / L[i, i]
+    return True
+
+
+@compiled
+def flat_curvature(state: Array, finger: float, slope: Array) -> float:
+    """Smaller curvature of the body (finger removed) and its derivatives over K."""
+    p, r = 0.5 * (state[3] - state[4] + finger), state[5]
+    D = (p * p + r * r + ROUND * ROUND) ** 0.5
+    slope[0], slope[1], slope[2] = 0.5 - 0.5 * p / D, 0.5 + 0.5 * p / D, -r / D
+    return float(0.5 * (state[3] + state[4] - finger) - D)
+
+
+@compiled
+def allowed(state: Array, middle: Array, box: Array) -> bool:
+    """Inside the box of places and forces, and the relative curvature positive definite."""
+    for i in range(3):
+        value = state[i] - (middle[i] if i < 2 else 0.0)
+        if not box[i, 0] <= value <= box[i, 1]:
+            return False
+    m, p = 0.5 * (state[3] + state[4]), 0.5 * (state[3] - state[4])
+    flat = m - (p * p + state[5] * state[5]) ** 0.5
+    return bool(flat > 1e-5 * m and 0.0 < m < 1e5)
+
+
+@compiled
+def evaluate(
+    readings: Array,
+    weights: Array,
+    tactels: Index,
+    state: Array,
+    digits: float,
+    problem: Problem,
+    room: Room,
+) -> tuple[float, float]:
+    """Fill the room at this state; chi2 of the readings, and the sum with the prior's part.
+
+    `digits` are those of the quadrature: the first steps need fewer.
+    """
+    modulus, compliance, depth, _, _ = problem.material
+    A, g, J = room.A, room.g, room.J
+    readings_into(
+        state, modulus, compliance, depth, digits, problem.kind, problem.rows, problem.positions,
+        tactels, room.model, J, room.M, room.M_J, room.u, room.p,
+    )  # fmt: skip
+    chi2 = 0.0
+    A[:], g[:] = 0.0, 0.0
+    for t in range(len(readings)):
+        w = weights[t] * weights[t]
+        if w > 0.0:
+            r = readings[t] - room.model[t]
+            chi2 += w * r * r
+            for i in range(6):
+                g[i] += w * r * J[t, i]
+                for j in range(i + 1):
+                    A[i, j] += w * J[t, i] * J[t, j]
+    total = chi2 + _add_prior(state, problem, A, g)
+    for i in range(6):
+        for j in range(i):
+            A[j, i] = A[i, j]
+    return chi2, total
+
+
+@compiled
+def _add_prior(state: Array, problem: Problem, A: Array, g: Array) -> float:
+    """Its residual's square; the lower triangle of A and g grow by it."""
+    mean, rate = problem.prior
+    if rate == 0.0:
+        return 0.0
+    slope = np.empty(3)
+    r = (mean - flat_curvature(state, problem.material[3], slope)) * rate
+    for i in range(3):
+        g[3 + i] += r * slope[i] * rate
+        for j in range(i + 1):
+            A[3 + i, 3 + j] += slope[i] * slope[j] * rate * rate
+    return r * r
+
+
+@compiled
+def ridge_tangents(w: Array) -> Array:
+    """Of the ridge at K = flat I + w w', columns x_0, y_0, ln F, w_x, w_y; (6, 5)."""
+    C = np.zeros((6, 5))
+    C[0, 0] = C[1, 1] = C[2, 2] = 1.0
+    C[3, 3], C[4, 4] = 2.0 * w[0], 2.0 * w[1]
+    C[5, 3], C[5, 4] = w[1], w[0]
+    return C
+
+
+@compiled
+def ridge_point(state: Array, finger: float, flat: float) -> Array:
+    """w of the ridge's point nearest to the state's body curvature."""
+    p, r = 0.5 * (state[3] - state[4] + finger), state[5]
+    D = (p * p + r * r) ** 0.5
+    size = max(0.5 * (state[3] + state[4] - finger) + D - flat, 1.0) ** 0.5
+    angle = 0.5 * np.arctan2(r, p)
+    return np.array((size * np.cos(angle), size * np.sin(angle)))
+
+
+@compiled
+def put_on_ridge(state: Array, w: Array, finger: float, flat: float) -> None:
+    state[3] = flat + w[0] * w[0]
+    state[4] = flat + w[1] * w[1] + finger
+    state[5] = w[0] * w[1]
+
+
+@compiled
+def moved_into(
+    state: Array, w: Array, step: Array, ridge: bool, problem: Problem, to: Array, w_to: Array
+) -> None:
+    """The state one step on; on the ridge the last two numbers of the step move w."""
+    for i in range(3):
+        to[i] = state[i] + step[i]
+    if ridge:
+        w_to[0], w_to[1] = w[0] + step[3], w[1] + step[4]
+        put_on_ridge(to, w_to, problem.material[3], problem.material[4])
+    else:
+        for i in range(3, 6):
+            to[i] = state[i] + step[i]
+
+
+@compiled
+def new_room(tactels: int) -> Room:
+    return Room(
+        np.empty(tactels), np.empty((tactels, 6)), np.empty(3), np.empty((3, 4)),
+        np.empty((3, MOST_NODES**2)), np.empty((2, MOST_NODES**2)), np.empty((6, 6)), np.empty(6),
+    )  # fmt: skip
+
+
+@compiled
+def fit_window(
+    readings: Array, weights: Array, tactels: Index, middle: Array, state: Array, ridge: bool,
+    problem: Problem, room: Room, information: Array,
+) -> tuple[float, int]:  # fmt: skip
+    """Move the state to the least sum of squares; chi2 there and the steps taken.
+
+    Args:
+        readings, weights: (T,), weights 1/sd and 0 for what is left out (a dead tactel).
+        tactels, middle: Which they are, and the window's middle [m].
+        state: Start, and then the answer (6,).
+        ridge: Keep the flat curvature at its given value: the one-curvature algorithm.
+        information: Out, J'WJ with the prior's part (6, 6).
+    """
+    n = 5 if ridge else 6
+    finger, flat = problem.material[3], problem.material[4]
+    w, w_trial, trial = ridge_point(state, finger, flat), np.zeros(2), state.copy()
+    if ridge:
+        put_on_ridge(state, w, finger, flat)
+    digits = ROUGH_DIGITS
+    chi2, total = evaluate(readings, weights, tactels, state, digits, problem, room)
+    information[:], g = room.A, room.g.copy()
+    L, step, damping = np.zeros((6, 6)), np.zeros(6), 1e-3
+    A_n, g_n = information, g
+    for done in range(MOST_STEPS):
+        if ridge:
+            C = ridge_tangents(w)
+            C_T = np.ascontiguousarray(C.T)
+            A_n, g_n = C_T @ information @ C, C_T @ g
+        while not solve_into(A_n, g_n, n, damping, L, step):
+            damping = max(10.0 * damping, 1e-9)
+        moved_into(state, w, step, ridge, problem, trial, w_trial)
+        fall = 0.0
+        for i in range(n):
+            fall += step[i] * g_n[i]
+        better = False
+        if allowed(trial, middle, problem.box):
+            chi2_trial, total_trial = evaluate(
+                readings, weights, tactels, trial, digits, problem, room
+            )
+            better = total_trial <= total
+            if better:
+                state[:], w[:], chi2, total = trial, w_trial, chi2_trial, total_trial
+                information[:], g[:] = room.A, room.g
+        damping = max(0.1 * damping, 1e-12) if better else 8.0 * damping
+        if digits < DIGITS and fall < ROUGH * (1.0 + 0.01 * total):
+            digits, damping = DIGITS, min(damping, 1e-3)
+            chi2, total = evaluate(readings, weights, tactels, state, digits, problem, room)
+            information[:], g[:] = room.A, room.g
+        elif fall < CONVERGED * (1.0 + total) or damping > 1e12:
+            return chi2, done + 1
+    return chi2, MOST_STEPS
+
+
+@compiled
+def fit_all(
+    readings: Array, weights: Array, tactels: Index, middles: Array, states: Array, ridge: bool,
+    problem: Problem,
+) -> tuple[Array, Array, Array]:  # fmt: skip
+    """`fit_window` of each row: information (B, 6, 6), chi2 and steps (B,); states move."""
+    B = len(readings)
+    information, chi2, steps = np.empty((B, 6, 6)), np.empty(B), np.empty(B)
+    room = new_room(readings.shape[1])
+    for i in range(B):
+        chi2[i], steps[i] = fit_window(
+            readings[i], weights[i], tactels[i], middles[i], states[i], ridge, problem, room,
+            information[i],
+        )  # fmt: skip
+    return information, chi2, steps

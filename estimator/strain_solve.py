@@ -1,0 +1,103 @@
+"""Fits of windows of strains by one of three algorithms, with other starts where a fit is poor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from estimator.response import ResponseModel
+from estimator.strain_array import StrainArray
+from estimator.strain_fit import MOST_STEPS, Problem, fit_all
+from estimator.strain_flags import POOR_FIT
+from estimator.strain_start import starts
+from estimator.strain_window import Windows
+from estimator.vectors import Array, Index, Mask
+
+Curvatures = Literal["map", "two", "one"]
+OTHER_STARTS = 3
+FORCES = (-9.0, 7.0)  # ln F [N]
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """States (B, 6), J'WJ with the prior (B, 6, 6), chi2 of the readings, steps, and whether the
+    second curvature was held at 0 because it came out below, (B,)."""
+
+    states: Array
+    information: Array
+    chi2: Array
+    steps: Array
+    saturated: Mask
+
+
+def solve(
+    windows: Windows,
+    touched: Mask,
+    array: StrainArray,
+    model: ResponseModel,
+    curvatures: Curvatures,
+    flat_prior: tuple[float, float],
+    convex: bool,
+) -> Solved:
+    """The best state of each window touched; see `strain.read_strains` for the algorithms."""
+    prior = (flat_prior[0], 1.0 / flat_prior[1]) if curvatures == "map" else (0.0, 0.0)
+    problem = _problem(array, model, prior)
+    B = len(touched)
+    solved = Solved(
+        np.tile([0.0, 0.0, -7.0, 1.0, 1.0 + array.curvature, 0.0], (B, 1)),
+        np.zeros((B, 6, 6)), np.zeros(B), np.zeros(B), np.zeros(B, dtype=np.bool_),
+    )  # fmt: skip
+    weights = np.where(windows.live, 1.0 / windows.sd, 0.0)
+    rows, ridge = np.flatnonzero(touched), curvatures == "one"
+    first = starts(windows.readings[rows], weights[rows], array)[:, 0]
+    first[:, :2] += windows.middles[rows]
+    _keep_better(solved, rows, first, windows, weights, problem, ridge, always=True)
+    freedom = np.maximum(windows.live.sum(axis=1) - 6, 1)
+    poor = touched & ((solved.chi2 > freedom * POOR_FIT**2) | (solved.steps >= MOST_STEPS))
+    rows = np.flatnonzero(poor)
+    if len(rows):
+        others = starts(windows.readings[rows], weights[rows], array, best=1 + OTHER_STARTS)
+        others[..., :2] += windows.middles[rows, None]
+        for k in range(1, 1 + OTHER_STARTS):
+            _keep_better(solved, rows, others[:, k], windows, weights, problem, ridge)
+    if curvatures == "two" and convex:
+        _saturate(solved, touched, array, windows, weights, problem)
+    return solved
+
+
+def _problem(array: StrainArray, model: ResponseModel, prior: tuple[float, float]) -> Problem:
+    reach_y, reach_x = (0.5 * (n + 1) for n in array.window)
+    x, y = reach_x * array.axial_pitch, reach_y * array.arc_pitch
+    material = (array.effective_modulus, array.compliance, array.depth, array.curvature, 0.0)
+    box = np.array([(-x, x), (-y, y), FORCES])
+    return Problem(model.kind, model.rows, model.positions, material, prior, box)
+
+
+def _keep_better(
+    solved: Solved, rows: Index, states: Array, windows: Windows, weights: Array, problem: Problem,
+    ridge: bool, *, always: bool = False,
+) -> None:  # fmt: skip
+    """Fit these rows from these states; where that explains the readings better, keep it."""
+    states = np.ascontiguousarray(states)
+    information, chi2, steps = fit_all(
+        windows.readings[rows], weights[rows], windows.tactels[rows], windows.middles[rows],
+        states, ridge, problem,
+    )  # fmt: skip
+    better = np.full(len(rows), True) if always else chi2 < solved.chi2[rows]
+    kept = rows[better]
+    solved.states[kept], solved.information[kept] = states[better], information[better]
+    solved.chi2[kept], solved.steps[kept] = chi2[better], steps[better]
+
+
+def _saturate(
+    solved: Solved, touched: Mask, array: StrainArray, windows: Windows, weights: Array,
+    problem: Problem,
+) -> None:  # fmt: skip
+    """Where the flat curvature came out negative: once more with it held at 0."""
+    half = 0.5 * (solved.states[:, 3] - solved.states[:, 4] + array.curvature)
+    mean = 0.5 * (solved.states[:, 3] + solved.states[:, 4] - array.curvature)
+    solved.saturated[:] = touched & (mean < np.hypot(half, solved.states[:, 5]))
+    rows = np.flatnonzero(solved.saturated)
+    _keep_better(solved, rows, solved.states[rows], windows, weights, problem, True, always=True)
