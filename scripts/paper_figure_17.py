@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from estimator.strain import read_strains
 from numpy.typing import NDArray
 from paper_experiments import INCH, Experiment
 from paper_page import Section, markdown_table, paragraphs
 from paper_sensor import DEPTH_MM, RADII, REPEATS, body
 
+from estimator.strain import read_strains
 from estimator.strain_array import StrainArray
 from estimator.vectors import unit
 from sim_sensor.tactel_imperfections import StrainImperfections
