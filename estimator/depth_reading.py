@@ -80,6 +80,7 @@ def locate(
 def fit_domain(
     cells: Array,
     radius: float,
+    longest: float,
     inside: Array,
     centre: Array,
     terms: Array,
