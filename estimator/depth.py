@@ -93,7 +93,7 @@ def _fit(
         told = 1e3 * np.array([noise.white, noise.correlated, noise.length])
         least = max(least, 4.0 * float(np.hypot(*told[:2])))
     centres, terms, covariances = np.zeros((B, 2)), np.zeros((B, TERMS)), np.zeros((B, 6, 6))
-    residuals, flags, noises = np.zeros(B), np.zeros(B, np.int64), np.tile(told, (B, 1))
+    residuals, flags, noises = np.zeros(B), np.zeros(B, np.intp), np.tile(told, (B, 1))
     pixels = max(1, int(CELL * 1e3 / pitch))
     read_images(
         np.ascontiguousarray(images), pitch, pixels, radius, least,

@@ -20,7 +20,7 @@ import numpy as np
 
 from estimator.compiled import compiled
 from estimator.depth_cells import COUNT, MEAN, X, Y
-from estimator.vectors import Array
+from estimator.vectors import Array, Mask
 
 TERMS = 6  # c, g_x, g_y, H_xx, H_xy, H_yy
 FEWEST_CELLS = 12
@@ -35,7 +35,7 @@ def dome(x: float, y: float, radius: float) -> float:
     if not np.isfinite(radius):
         return 0.0
     r2 = x * x + y * y
-    return -r2 / (radius + max(radius * radius - r2, 0.0) ** 0.5)
+    return -r2 / float(radius + max(radius * radius - r2, 0.0) ** 0.5)
 
 
 @compiled
@@ -57,7 +57,7 @@ def beyond_quadratic(x: float, y: float, t: Array) -> float:
     hx, hy = t[3] * x + t[4] * y, t[4] * x + t[5] * y
     bend = hx * hx + hy * hy
     q = 0.5 * (x * hx + y * hy)
-    return 0.5 * bend * (t[1] * x + t[2] * y + 0.5 * q)
+    return float(0.5 * bend * (t[1] * x + t[2] * y + 0.5 * q))
 
 
 @compiled
@@ -100,7 +100,7 @@ def inverse(A: Array, out: Array) -> bool:
 
 
 @compiled
-def centroid(cells: Array, inside: Array, centre: Array) -> int:
+def centroid(cells: Array, inside: Mask, centre: Array) -> int:
     """Write the middle of the domain (x, y) [mm] to `centre`; how many cells it has."""
     n, weight = 0, 0.0
     centre[:] = 0.0
@@ -118,7 +118,7 @@ def centroid(cells: Array, inside: Array, centre: Array) -> int:
 
 @compiled
 def fit_once(
-    cells: Array, inside: Array, radius: float, centre: Array, terms: Array, inv: Array
+    cells: Array, inside: Mask, radius: float, centre: Array, terms: Array, inv: Array
 ) -> bool:
     """Least squares over the domain, about its middle; False where that has no solution.
 
@@ -201,7 +201,7 @@ def ellipse_of(terms: Array, radius: float, centre: Array, longest: float, ellip
 
 
 @compiled
-def domain(cells: Array, ellipse: Array, inside: Array) -> int:
+def domain(cells: Array, ellipse: Array, inside: Mask) -> int:
     """Mark the cells well inside the ellipse, never less than 0.3 of its depth; their number."""
     n = 0
     for i in range(inside.shape[0]):

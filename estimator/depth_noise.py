@@ -19,7 +19,7 @@ import numpy as np
 from estimator.compiled import compiled
 from estimator.depth_cells import COUNT, MEAN, X, Y
 from estimator.depth_fit import TERMS, beyond_quadratic, dome, row_of
-from estimator.vectors import Array
+from estimator.vectors import Array, Mask
 
 LENGTHS = np.array((0.0, 0.25, 0.4, 0.6, 0.9, 1.3, 2.0, 3.0))  # tried where none is told [mm]
 _LIKELY, _SPREAD = 1.3, 0.6  # of those: [mm], sd of the logarithm
@@ -120,7 +120,7 @@ def _two_variances(rows: Array) -> tuple[float, float]:
 
 @compiled
 def smooth_moment(
-    cells: Array, inside: Array, centre: Array, side: float, pixels: int, length: float, B: Array
+    cells: Array, inside: Mask, centre: Array, side: float, pixels: int, length: float, B: Array
 ) -> None:
     """B = X'RX of unit correlated noise over the domain, (6, 6).
 
@@ -171,7 +171,7 @@ def smooth_moment(
 
 @compiled
 def residuals(
-    cells: Array, inside: Array, radius: float, centre: Array, terms: Array, out: Array
+    cells: Array, inside: Mask, radius: float, centre: Array, terms: Array, out: Array
 ) -> float:
     """Write each cell's misfit [mm] (zero outside); their mean square, pixels as weights."""
     square, weight, row = 0.0, 0.0, np.empty(TERMS)
@@ -202,7 +202,7 @@ def trace_product(A: Array, B: Array) -> float:
 
 @compiled
 def expected_square(
-    cells: Array, inside: Array, inv: Array, B: Array, side: float, pixels: int, noise: Array
+    cells: Array, inside: Mask, inv: Array, B: Array, side: float, pixels: int, noise: Array
 ) -> float:
     """Mean square misfit [mm^2] that noise (white, correlated, length) leaves after the fit."""
     weight, n = 0.0, 0
@@ -214,13 +214,13 @@ def expected_square(
     pitch, length = side / pixels, max(noise[2], 1e-6)
     flat = length**2 / (length**2 + pitch**2 * (pixels**2 - 1.0) / 6.0)
     smooth = max(flat - trace_product(inv, B) / weight, 1e-3)
-    return noise[0] ** 2 * max(n - TERMS, 1) / weight + noise[1] ** 2 * smooth
+    return float(noise[0] ** 2 * max(n - TERMS, 1) / weight + noise[1] ** 2 * smooth)
 
 
 @compiled
 def noise_of_residuals(
     cells: Array,
-    inside: Array,
+    inside: Mask,
     centre: Array,
     inv: Array,
     side: float,

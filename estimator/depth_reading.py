@@ -17,7 +17,7 @@ from estimator.depth_fit import (
     fit_once,
 )
 from estimator.depth_noise import expected_square, noise_of_residuals, residuals, smooth_moment
-from estimator.vectors import Array
+from estimator.vectors import Array, Index, Mask
 
 FLAGS = (
     "no contact",
@@ -46,19 +46,17 @@ def _leaves_image(hertz: Array, half_width: float, half_height: float) -> bool:
     """Whether the contact ellipse reaches beyond the image."""
     x, y, c, s, a, b = hertz[0], hertz[1], hertz[2], hertz[3], hertz[4], hertz[5]
     wide, high = np.hypot(a * c, b * s), np.hypot(a * s, b * c)
-    return abs(x) + wide > half_width or abs(y) + high > half_height
+    return bool(abs(x) + wide > half_width or abs(y) + high > half_height)
 
 
 @compiled
-def locate(
-    cells: Array, deepest: float, same: int, pixels: int, least: float, inside: Array
-) -> int:
+def locate(cells: Array, deepest: float, same: int, pixels: int, least: float, inside: Mask) -> int:
     """Flags of where the contact is; `inside` becomes the cells that surely belong to it."""
     i, j, peak = deepest_cell(cells)
     inside[:] = False
     if not peak > least:
         return NO_CONTACT
-    labels = np.zeros(inside.shape, np.int64)
+    labels = np.zeros(inside.shape)
     blob = flood(cells, i, j, _BLOB * peak, 1, labels)
     flags = 0
     if other_blob(cells, _BLOB * peak, labels) >= max(4, blob // 20):
@@ -81,7 +79,7 @@ def fit_domain(
     cells: Array,
     radius: float,
     longest: float,
-    inside: Array,
+    inside: Mask,
     centre: Array,
     terms: Array,
     inv: Array,
@@ -117,7 +115,7 @@ def place_only(cells: Array, radius: float, centre: Array, terms: Array) -> None
 
 @compiled
 def covariance_into(
-    cells: Array, inside: Array, centre: Array, inv: Array, side: float, pixels: int,
+    cells: Array, inside: Mask, centre: Array, inv: Array, side: float, pixels: int,
     noise: Array, B: Array, out: Array,
 ) -> None:  # fmt: skip
     """s_w^2 A^-1 + s_c^2 A^-1 B A^-1; leaves B = X'RX."""
@@ -149,7 +147,7 @@ def read_images(
     terms: Array,
     covariances: Array,
     residual: Array,
-    flags: Array,
+    flags: Index,
 ) -> None:
     """`images` (B, H, W) in mm to the fitted terms; everything but the images in mm too.
 

@@ -90,8 +90,13 @@ def surfaces_of(
     touched.setflags(write=False)
     return DepthReadings(
         touched,
-        *map(frozen, (p, frames, K, cov8, residuals, noises * 1e-3)),
-        tuple(map(_phrases, bits.tolist())),
+        positions=frozen(p),
+        frames=frozen(frames),
+        tensors=frozen(K),
+        covariances=frozen(cov8),
+        residuals=frozen(residuals),
+        noises=frozen(noises * 1e-3),
+        flags=tuple(map(_phrases, bits.tolist())),
     )
 
 

@@ -24,9 +24,10 @@ import tempfile
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from estimator.vectors import Array, frozen
 
@@ -78,7 +79,8 @@ class RawTouches:
             raise ValueError(f"finger: expected {N} names or none, got {len(self.finger)}")
 
     def __len__(self) -> int:
-        return len(np.atleast_1d(self.strains if self.depth is None else self.depth))
+        signals = self.strains if self.depth is None else self.depth
+        return 0 if signals is None else len(np.atleast_1d(signals))
 
 
 def read_raw(path: str | Path) -> RawTouches:
@@ -99,9 +101,9 @@ def read_raw(path: str | Path) -> RawTouches:
             raise ValueError("pixel_pitch is missing: depth needs it [m]")
         return RawTouches(
             X_WS=arrays["X_WS"],
-            depth=arrays.get("depth"),
+            depth=_optional(arrays, "depth"),
             pixel_pitch=_number(arrays, "pixel_pitch", float("nan")),
-            strains=arrays.get("strains"),
+            strains=_optional(arrays, "strains"),
             finger=tuple(str(name) for name in np.atleast_1d(arrays.get("finger", []))),
             sensor=str(arrays.get("sensor", "")),
             pad_radius=_number(arrays, "pad_radius", float("inf")),
@@ -117,7 +119,7 @@ def write_raw(path: str | Path, touches: RawTouches) -> None:
         OSError: The folder cannot be written.
     """
     path = Path(path)
-    arrays: dict[str, ArrayLike] = {"X_WS": touches.X_WS}
+    arrays: dict[str, Any] = {"X_WS": touches.X_WS}
     if touches.depth is not None:
         arrays |= {"depth": touches.depth, "pixel_pitch": touches.pixel_pitch}
         if np.isfinite(touches.pad_radius):
@@ -131,7 +133,7 @@ def write_raw(path: str | Path, touches: RawTouches) -> None:
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "wb") as file:
-            np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
+            np.savez_compressed(file, **arrays)
         os.chmod(temporary, 0o644)
         os.replace(temporary, path)
     except BaseException:
@@ -140,7 +142,7 @@ def write_raw(path: str | Path, touches: RawTouches) -> None:
         raise
 
 
-def _arrays(path: Path) -> dict[str, NDArray[np.generic]]:
+def _arrays(path: Path) -> dict[str, NDArray[Any]]:
     """All arrays of the file."""
     try:
         with np.load(path, allow_pickle=False) as file:
@@ -159,7 +161,11 @@ def _arrays(path: Path) -> dict[str, NDArray[np.generic]]:
         raise
 
 
-def _number(arrays: dict[str, NDArray[np.generic]], name: str, default: float) -> float:
+def _optional(arrays: dict[str, NDArray[Any]], name: str) -> Array | None:
+    return arrays.get(name)
+
+
+def _number(arrays: dict[str, NDArray[Any]], name: str, default: float) -> float:
     if name not in arrays:
         return default
     value = arrays[name]

@@ -40,7 +40,7 @@ def free_surface(a: Array, b: Array, delta: Array) -> Array:
         elliprd(s, A, B) / 1.5, common / B,
     ]  # fmt: skip
     whole = 2.0 * elliprf(0.0, a**2, b**2)
-    return np.stack(layers, axis=-1) / whole[:, None, None]
+    return np.asarray(np.stack(layers, axis=-1) / whole[:, None, None])
 
 
 @compiled
@@ -76,7 +76,7 @@ def height(x: float, y: float, c: Array) -> float:
     second = c[0] * x * x + c[1] * x * y + c[2] * y * y
     third = x * x * (c[3] * x + c[4] * y) + y * y * (c[5] * x + c[6] * y)
     fourth = x * x * (c[7] * x * x + c[8] * x * y + c[9] * y * y)
-    return second + third + fourth + y * y * y * (c[10] * x + c[11] * y)
+    return float(second + third + fourth + y * y * y * (c[10] * x + c[11] * y))
 
 
 @compiled
