@@ -13,11 +13,9 @@ from numpy.typing import ArrayLike
 
 from estimator.depth_fit import TERMS
 from estimator.depth_noise import DepthNoise
-from estimator.depth_reading import read_images
+from estimator.depth_reading import CELL, read_images
 from estimator.depth_surfaces import DepthReadings, surfaces_of
 from estimator.vectors import Array, Index
-
-CELL = 0.35e-3  # largest side of a cell [m]
 
 
 def read_depth(
@@ -48,10 +46,10 @@ def read_depth(
         ValueError: Wrong shape, smaller than 8 x 8, infinite depths, pitch, radius or depth not
             positive.
     """
-    images = _images("depth", depth, 2)
+    images = images_of("depth", depth, 2)
     if np.any(np.isinf(images)):
         raise ValueError("depth: expected metres, NaN for dead pixels, found an infinite one")
-    _require_positive(pixel_pitch=pixel_pitch, least_depth=least_depth)
+    require_positive(pixel_pitch=pixel_pitch, least_depth=least_depth)
     half_diagonal = 0.5 * pixel_pitch * float(np.hypot(*images.shape[1:]))
     if not pad_radius > half_diagonal:
         raise ValueError(
@@ -62,7 +60,7 @@ def read_depth(
     return surfaces_of(*fit, pad_radius, noise or DepthNoise())
 
 
-def _images(name: str, values: ArrayLike, ndim: int) -> Array:
+def images_of(name: str, values: ArrayLike, ndim: int) -> Array:
     """As a batch of floats, (B, H, W, ...)."""
     try:
         images = np.asarray(values, dtype=np.float64)
@@ -77,7 +75,7 @@ def _images(name: str, values: ArrayLike, ndim: int) -> Array:
     return images
 
 
-def _require_positive(**values: float) -> None:
+def require_positive(**values: float) -> None:
     for name, value in values.items():
         if not (np.isfinite(value) and value > 0.0):
             raise ValueError(f"{name}: expected a finite number > 0 [m], got {value!r}")
@@ -94,7 +92,7 @@ def _fit(
         least = max(least, 4.0 * float(np.hypot(*told[:2])))
     centres, terms, covariances = np.zeros((B, 2)), np.zeros((B, TERMS)), np.zeros((B, 6, 6))
     residuals, flags, noises = np.zeros(B), np.zeros(B, np.intp), np.tile(told, (B, 1))
-    pixels = max(1, int(CELL * 1e3 / pitch))
+    pixels = max(1, int(CELL / pitch))
     read_images(
         np.ascontiguousarray(images), pitch, pixels, radius, least,
         noises, centres, terms, covariances, residuals, flags,

@@ -30,9 +30,10 @@ FLAGS = (
     "directions undetermined (umbilic)",
 )
 NO_CONTACT, TWO, BORDER, SATURATED, POOR, SMALL, HOLLOW, UMBILIC = (1 << k for k in range(8))
+CELL = 0.35  # largest side of a cell [mm]
 _START, _BLOB = 0.8, 0.5  # of the deepest cell
 _PLATEAU = 0.1  # of a contact's pixels equal to the deepest one: clipped
-_POOR = 1.6  # residual over noise
+POOR_RATIO = 1.6  # residual over noise
 _DOUBT = 9.0  # on variances, where a flag says that the fit may not be the object
 
 
@@ -42,7 +43,7 @@ def _is_clipped(same: int, blob: int, pixels: int) -> bool:
 
 
 @compiled
-def _leaves_image(hertz: Array, half_width: float, half_height: float) -> bool:
+def leaves_image(hertz: Array, half_width: float, half_height: float) -> bool:
     """Whether the contact ellipse reaches beyond the image."""
     x, y, c, s, a, b = hertz[0], hertz[1], hertz[2], hertz[3], hertz[4], hertz[5]
     wide, high = np.hypot(a * c, b * s), np.hypot(a * s, b * c)
@@ -173,7 +174,7 @@ def read_images(
         if flags[b] & SMALL:
             place_only(cells, radius, centres[b], terms[b])
             continue
-        if _leaves_image(hertz, 0.5 * pitch * images.shape[2], 0.5 * pitch * images.shape[1]):
+        if leaves_image(hertz, 0.5 * pitch * images.shape[2], 0.5 * pitch * images.shape[1]):
             flags[b] |= BORDER
         square = residuals(cells, inside, radius, centres[b], terms[b], misfit)
         if np.isnan(noise[b, 0]):
@@ -181,7 +182,7 @@ def read_images(
         covariance_into(cells, inside, centres[b], inv, side, pixels, noise[b], B, covariances[b])
         expected = expected_square(cells, inside, inv, B, side, pixels, noise[b])
         residual[b] = (square / max(expected, 1e-30)) ** 0.5
-        if residual[b] > _POOR:
+        if residual[b] > POOR_RATIO:
             flags[b] |= POOR
             covariances[b] *= residual[b] ** 2
         if flags[b] & (TWO | SATURATED | HOLLOW):
