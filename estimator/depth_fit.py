@@ -7,7 +7,8 @@ the fit: from the fitted relative curvatures and depth Hertz gives the contact e
     b^2 = 2 delta (E/K) / (kappa_a + kappa_b),    a/b = t^-0.636,   t = kappa_a / kappa_b
 
 (complete elliptic integrals E/K by Hamrock & Brewe's fit, 3 %: a domain needs no more), and the
-next fit uses |v| < 0.7 b across and nothing beyond 0.85 of the ellipse.
+next fit uses |v| < 0.85 b across and nothing beyond 0.95 of the ellipse. (Half spaces only: a bonded
+layer is in contact farther out than its depth says, so the domain errs to the safe side.)
 
 Along a principal direction bodies are rather arcs than parabolas. To fourth order a sphere and a
 cylinder of any radius are z = q + 1/2 (g.x) x'H^2x + 1/4 q x'H^2x, q = 1/2 x'Hx; the two last terms
@@ -24,7 +25,7 @@ from estimator.vectors import Array, Mask
 
 TERMS = 6  # c, g_x, g_y, H_xx, H_xy, H_yy
 FEWEST_CELLS = 12
-ACROSS, WITHIN = 0.7, 0.85
+ACROSS, WITHIN = 0.85, 0.95
 _FLATTEST = 1.0 / 400.0  # of kappa_a / kappa_b, for the length of a line contact
 ROUNDS = 7
 
@@ -191,7 +192,8 @@ def ellipse_of(terms: Array, radius: float, centre: Array, longest: float, ellip
     c, s = np.cos(angle), np.sin(angle)
     gu, gv, soft = c * gx + s * gy, -s * gx + c * gy, max(along, _FLATTEST * across)
     a, b = semi_axes(along, across, depth, longest)
-    u = min(max(gu / soft, -0.5 * a), 0.5 * a)
+    half = 0.5 * a if a < longest else 0.0  # a line has no deepest point
+    u = min(max(gu / soft, -half), half)
     v = min(max(gv / across, -0.5 * b), 0.5 * b)
     delta = depth + gu * u + gv * v - 0.5 * (soft * u * u + across * v * v)
     ellipse[0], ellipse[1] = centre[0] + c * u - s * v, centre[1] + s * u + c * v

@@ -31,7 +31,7 @@ FLAGS = (
 )
 NO_CONTACT, TWO, BORDER, SATURATED, POOR, SMALL, HOLLOW, UMBILIC = (1 << k for k in range(8))
 CELL = 0.35  # largest side of a cell [mm]
-_START, _BLOB = 0.8, 0.5  # of the deepest cell
+_START, _BLOB = 0.6, 0.5  # of the deepest cell
 _PLATEAU = 0.1  # of a contact's pixels equal to the deepest one: clipped
 POOR_RATIO = 1.6  # residual over noise
 _DOUBT = 9.0  # on variances, where a flag says that the fit may not be the object

@@ -143,7 +143,7 @@ class GelSession:
 
         The body's x becomes the pad's x (on a dome projected), its y the pad's -y, its normal the
         pad's inward normal at `at`. Where the body is so flat or so hollow that the ellipse would
-        outgrow the pad, it is cut to half the pad's diagonal.
+        outgrow the pad, it is cut to 0.75 of the pad's diagonal.
 
         Args:
             bodies: Of `patches_on` or `arc_patches`.
@@ -196,7 +196,7 @@ class GelSession:
         angle = 0.5 * np.arctan2(-xy, -half)
         across = np.maximum(mean + D, 0.2)
         along, soft = np.minimum(mean - D, across), load.copy() if is_force else np.ones_like(load)
-        longest = 0.5 * float(np.hypot(*pad.size))
+        longest = 0.75 * float(np.hypot(*pad.size))
         for _ in range(4):
             a, b, delta, k_a = _ellipse(along, across, soft, pad.effective_modulus, longest)
             stiffer = 1.0 + 0.5 * a * b / pad.thickness**2  # bonded layer, 1 + 2 S^2
