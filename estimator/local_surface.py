@@ -7,7 +7,7 @@ the pose of the sensor turns that into a `Contact`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -92,6 +92,24 @@ def contact_from(
         sensor=sensor,
         covariance=turn @ surface.covariance @ turn.T,
     )
+
+
+def misplaced(surface: LocalSurface, *, place: float, turn: float) -> LocalSurface:
+    """The same from a sensor whose pose is known this well, sd along [m] and about [rad] each axis.
+
+    A small turn w about the origin of S moves p by w x p, n by w x n, and turns the tensor by w.n
+    about the normal.
+    """
+    K, p = surface.tensor, surface.position
+    J = np.zeros((ERRORS, 3))
+    for k, w in enumerate(np.eye(3)):
+        spin = surface.frame[2, k]
+        J[:3, k] = surface.frame @ np.cross(w, p)
+        J[3:5, k] = surface.frame[:2] @ np.cross(w, surface.frame[2])
+        J[5:, k] = spin * np.array([-2.0 * K[0, 1], 2.0 * K[0, 1], K[0, 0] - K[1, 1]])
+    added = turn**2 * J @ J.T
+    added[:3, :3] += place**2 * np.eye(3)
+    return replace(surface, covariance=surface.covariance + added)
 
 
 def rigid(name: str, X: ArrayLike) -> Array:

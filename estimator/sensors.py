@@ -25,6 +25,40 @@ SENSORS: dict[str, SensorNoise] = {
     "gel": SensorNoise(0.10e-3, 0.7 * _DEG, 0.0, 1.2, 1.7, 0.046, 3.0),
     "gel-good": SensorNoise(0.05e-3, 0.3 * _DEG, 0.0, 0.41, 0.58, 0.024, 1.0),
     "gel-poor": SensorNoise(0.20e-3, 1.4 * _DEG, 0.0, 4.1, 5.8, 0.108, 8.0),
+    # what raw signals are worth after reading (`estimator.raw_sensors`): measured, typical
+    "fearing-strain": SensorNoise(
+        0.15e-3,
+        0.6 * _DEG,
+        0.0,
+        1.5,
+        2.0,
+        0.0,
+        0.5,
+        direction_offset=1.0 * _DEG,
+        scale_offset=0.03,
+    ),
+    "gel-depth": SensorNoise(
+        0.10e-3,
+        0.7 * _DEG,
+        0.0,
+        1.2,
+        1.7,
+        0.0,
+        0.5,
+        direction_offset=0.5 * _DEG,
+        scale_offset=0.03,
+    ),
+    "taxel-array": SensorNoise(
+        0.15e-3,
+        1.0 * _DEG,
+        0.0,
+        1.5,
+        2.0,
+        0.0,
+        0.5,
+        direction_offset=0.5 * _DEG,
+        scale_offset=0.03,
+    ),
 }
 
 

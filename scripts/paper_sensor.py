@@ -9,13 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from estimator.strain import read_strains
 from numpy.typing import NDArray
 from paper_experiments import INCH
 from paper_page import Section, Verdict, markdown_table, paragraphs
 from scipy.optimize import brentq
 
 from estimator.hertz import contact_ellipse
+from estimator.strain import read_strains
 from estimator.strain_array import StrainArray
 from estimator.strain_model import reading_slopes, touch_state
 from sim_sensor.tactels import StrainFinger

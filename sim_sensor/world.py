@@ -22,8 +22,9 @@ from typing import Protocol
 import numpy as np
 
 from estimator.contact import Contact, Miss
-from estimator.surface import Geometry, SurfaceOfRevolution
+from estimator.surface import Geometry, Place, SurfaceOfRevolution
 from estimator.vectors import Array, basis_across, frozen, unit
+from sim_sensor.feeling import Felt, ReadingSense, Sense, Touched
 from sim_sensor.noise import Session, Site
 from sim_sensor.solid import NearestPlace, Part, Solid
 
@@ -54,6 +55,7 @@ class TouchRecord:
         truth: Exact geometry at the touched place; None after a miss.
         part: The part of the object that was touched; None after a miss.
         overlap: How deep the path started in the object [m]; 0 as it should be.
+        felt: The raw signal and what its reader said; None after a miss.
     """
 
     outcome: Contact | Miss
@@ -62,6 +64,7 @@ class TouchRecord:
     truth: Geometry | None = None
     part: Part | None = None
     overlap: float = 0.0
+    felt: Felt | None = None
 
 
 class World:
@@ -69,15 +72,15 @@ class World:
 
     Args:
         surface: The object at its pose; its ends are flat caps.
-        session: The mounted sensor.
+        sensor: The mounted sensor: a session of readings, or a sense of raw signals.
         rng: For the readings.
     """
 
     def __init__(
-        self, surface: SurfaceOfRevolution, session: Session, *, rng: np.random.Generator
+        self, surface: SurfaceOfRevolution, sensor: Session | Sense, *, rng: np.random.Generator
     ) -> None:
         self.surface = surface
-        self._session = session
+        self._sense: Sense = ReadingSense(sensor) if isinstance(sensor, Session) else sensor
         self._rng = rng
         self._solid = Solid(surface.profile)
         self._records: list[TouchRecord] = []
@@ -91,12 +94,17 @@ class World:
         """True distance of a point to the object, negative inside [m]."""
         return self._nearest(point_W).distance
 
-    def touch(self, path: TouchPath, *, site: Site | None = None) -> Contact | Miss:
+    def touch(
+        self, path: TouchPath, *, site: Site | None = None, finger_axis_W: Array | None = None
+    ) -> Contact | Miss:
         """Move the pad along the path until it meets the object, and feel.
+
+        A sensor that feels nothing where the pad rests reports a miss.
 
         Args:
             path: The approach.
             site: Offsets shared with earlier readings at this place (`Session.new_site`).
+            finger_axis_W: Direction of the finger's last link, (3,); None is horizontal.
         Raises:
             ValueError: Not a path: fewer than two points, none that differ, wrong shape, not
                 finite, or a radius that is not positive.
@@ -108,34 +116,39 @@ class World:
         if stop is None:
             record = TouchRecord(Miss(centres[-1], radius), frozen(centres[-1]), len(centres) - 1.0)
         else:
-            record = self._felt(_along(route, stop), site, stop, max(overlap, 0.0))
+            tip = _along(route, stop)
+            if overlap > 0:
+                stop = max(stop - 1.0, 0.0)  # the route has one point before the path
+            touched = self._touched(tip, site, finger_axis_W)
+            felt = self._sense.feel(touched, rng=self._rng)
+            outcome = felt.contact or Miss(tip, radius)
+            record = TouchRecord(
+                outcome, frozen(tip), stop, touched.truth, self._nearest(tip).part,
+                max(overlap, 0.0), felt,
+            )  # fmt: skip
         self._records.append(record)
         return record.outcome
 
-    def _felt(self, tip: Array, site: Site | None, stop: float, overlap: float) -> TouchRecord:
-        """The touch of a pad whose centre stopped at `tip`."""
-        truth, part = self._geometry(tip)
-        contact = self._session.read(truth, rng=self._rng, site=site)
-        if overlap > 0:
-            stop = max(stop - 1.0, 0.0)  # the route has one point before the path
-        return TouchRecord(contact, frozen(tip), stop, truth, part, overlap)
+    def _touched(self, tip: Array, site: Site | None, finger_axis_W: Array | None) -> Touched:
+        """Where a pad rests whose centre stopped at `tip`."""
+        nearest, theta = self._nearest(tip), float(self.surface.place_of(tip).theta)
+        place = Place(theta, nearest.z) if nearest.part is Part.WALL else None
+        return Touched(self._geometry(tip, nearest, theta), place, finger_axis_W, site)
 
-    def _geometry(self, tip: Array) -> tuple[Geometry, Part]:
+    def _geometry(self, tip: Array, place: NearestPlace, theta: float) -> Geometry:
         """Exact geometry at the place nearest to the pad's centre."""
-        place = self._nearest(tip)
         x, y, u = self.surface.frame
-        theta = np.array(self.surface.place_of(tip).theta)
         if place.part is Part.WALL:
-            return self.surface.at(theta, np.array(place.z)), place.part
+            return self.surface.at(np.array(theta), np.array(place.z))
         out = np.cos(theta) * x + np.sin(theta) * y
         p = self.surface.axis.point + place.rho * out + place.z * u
         if place.part is Part.RIM:
             n = unit(tip - p)
             k_theta = np.cross(u, out)
             kappa_theta = n @ out / place.rho
-            return _geometry(p, n, k_theta, kappa_theta, 1.0 / EDGE_RADIUS), place.part
+            return _geometry(p, n, k_theta, kappa_theta, 1.0 / EDGE_RADIUS)
         n = u if place.z > np.mean(self.surface.profile.z_range) else -u
-        return _geometry(p, n, basis_across(n)[0], 0.0, 0.0), place.part
+        return _geometry(p, n, basis_across(n)[0], 0.0, 0.0)
 
     def _nearest(self, point_W: Array) -> NearestPlace:
         x, y, z = self.surface.frame @ (point_W - self.surface.axis.point)

@@ -232,7 +232,11 @@ def test_a_path_that_starts_inside_touches_on_its_way_there_and_says_how_deep() 
 
 def test_touch_is_found_to_a_nanometre_on_an_oblique_path() -> None:
     surface = SurfaceOfRevolution(Axis([0, 0, 0], [0, 0, 1]), cylinder(0.03, 0.1))
-    world = World(surface, world_of("can")._session, rng=np.random.default_rng(0))
+    world = World(
+        surface,
+        simulated_sensor("gel").session(rng=np.random.default_rng(0)),
+        rng=np.random.default_rng(0),
+    )
     total = 0.03 + RADIUS
     for x in (0.0, 0.5 * total, 0.99 * total):
         route = np.array([[x, -0.2, 0.0], [x, 0.0, 0.01]])
