@@ -185,6 +185,27 @@ def ellipse_into(K: Array, force: float, modulus: float, M: Array, J: Array) -> 
 
 
 @compiled
+def curvature_into(M: Array, force: float, modulus: float, K: Array) -> None:
+    """`ellipse_into` backwards: K = (K_xx, K_yy, K_xy) of M = (M_xx, M_yy, M_xy).
+
+    (a - b) / (a + b) = (q / s) tanh w gives w by Newton, then S gives m.
+    """
+    S, p, r = 0.5 * (M[0] + M[1]), 0.5 * (M[0] - M[1]), M[2]
+    half = (p * p + r * r) ** 0.5
+    e = min(half / S, 1.0 - 1e-6)
+    w = 0.8 * np.log((1.0 + e) / (1.0 - e))
+    for _ in range(6):
+        s, ds, q, dq = shape_functions(w)
+        value = np.exp(q - s) * np.tanh(w)
+        slope = value * (dq - ds) + np.exp(q - s) / np.cosh(w) ** 2
+        w = min(max(w - (value - e) / slope, 0.0), WIDEST)
+    m = force / modulus * (np.exp(shape_functions(w)[0]) / S) ** 3
+    D = m * np.tanh(w)
+    cos, sin = (p / half, r / half) if half > 0.0 else (0.0, 0.0)
+    K[0], K[1], K[2] = m - D * cos, m + D * cos, -D * sin
+
+
+@compiled
 def _ellipses(K: Array, force: Array, modulus: float) -> Array:
     """`ellipse_into` for each row."""
     out, M, J = np.empty_like(K), np.empty(3), np.empty((3, 4))

@@ -13,13 +13,15 @@ from typing import NamedTuple
 import numpy as np
 
 from estimator.compiled import compiled
-from estimator.strain_model import DIGITS, MOST_NODES, readings_into
+from estimator.hertz import curvature_into, ellipse_into
+from estimator.strain_model import DIGITS, MOST_NODES, ellipse_readings, over_curvature
 from estimator.vectors import Array, Index
 
 MOST_STEPS = 60
-CONVERGED = 1e-6  # predicted fall of the sum of squares
-ROUGH = 0.3  # until it is this small a rougher quadrature serves
-ROUGH_DIGITS = 2.5
+CONVERGED = 1e-5  # predicted fall of the sum of squares, of the sum + 1e-6
+ROUGH = 1e-2  # of the sum + 100 for the first part: less is not worth a step by the ellipse
+ROUGH_DIGITS = 3.0
+BY_ELLIPSE, BY_CURVATURE, ON_RIDGE = 0, 1, 2
 ROUND = 0.1  # curvatures closer than this count as one in the prior's slope [1/m]
 
 
@@ -89,37 +91,40 @@ def flat_curvature(state: Array, finger: float, slope: Array) -> float:
 
 
 @compiled
-def allowed(state: Array, middle: Array, box: Array) -> bool:
-    """Inside the box of places and forces, and the relative curvature positive definite."""
+def allowed(state: Array, middle: Array, box: Array, least_ratio: float) -> bool:
+    """Inside the box of places and forces, and the tensor positive definite."""
     for i in range(3):
         value = state[i] - (middle[i] if i < 2 else 0.0)
         if not box[i, 0] <= value <= box[i, 1]:
             return False
     m, p = 0.5 * (state[3] + state[4]), 0.5 * (state[3] - state[4])
-    flat = m - (p * p + state[5] * state[5]) ** 0.5
-    return bool(flat > 1e-5 * m and 0.0 < m < 1e5)
+    least = m - (p * p + state[5] * state[5]) ** 0.5
+    return bool(least > least_ratio * m and 0.0 < m < 1e5)
 
 
 @compiled
 def evaluate(
-    readings: Array,
-    weights: Array,
-    tactels: Index,
-    state: Array,
-    digits: float,
-    problem: Problem,
-    room: Room,
-) -> tuple[float, float]:
+    readings: Array, weights: Array, tactels: Index, state: Array, by_ellipse: bool,
+    problem: Problem, room: Room,
+) -> tuple[float, float]:  # fmt: skip
     """Fill the room at this state; chi2 of the readings, and the sum with the prior's part.
 
-    `digits` are those of the quadrature: the first steps need fewer.
+    `by_ellipse` says that the state's last three numbers are the ellipse, not the curvature: then
+    the quadrature is rough and there is no prior.
     """
-    modulus, compliance, depth, _, _ = problem.material
+    modulus, compliance, depth = problem.material[:3]
     A, g, J = room.A, room.g, room.J
-    readings_into(
-        state, modulus, compliance, depth, digits, problem.kind, problem.rows, problem.positions,
-        tactels, room.model, J, room.M, room.M_J, room.u, room.p,
+    digits = ROUGH_DIGITS if by_ellipse else DIGITS
+    if by_ellipse:
+        room.M[:] = state[3:6]
+    else:
+        ellipse_into(state[3:6], np.exp(state[2]), modulus, room.M, room.M_J)
+    ellipse_readings(
+        state, room.M, (depth, digits), compliance, problem.kind, problem.rows, problem.positions,
+        tactels, room.model, J, room.u, room.p,
     )  # fmt: skip
+    if not by_ellipse:
+        over_curvature(J, room.M_J)
     chi2 = 0.0
     A[:], g[:] = 0.0, 0.0
     for t in range(len(readings)):
@@ -131,7 +136,9 @@ def evaluate(
                 g[i] += w * r * J[t, i]
                 for j in range(i + 1):
                     A[i, j] += w * J[t, i] * J[t, j]
-    total = chi2 + _add_prior(state, problem, A, g)
+    total = chi2
+    if not by_ellipse:
+        total += _add_prior(state, problem, A, g)
     for i in range(6):
         for j in range(i):
             A[j, i] = A[i, j]
@@ -204,26 +211,20 @@ def new_room(tactels: int) -> Room:
 
 
 @compiled
-def fit_window(
-    readings: Array, weights: Array, tactels: Index, middle: Array, state: Array, ridge: bool,
-    problem: Problem, room: Room, information: Array,
+def descend(
+    readings: Array, weights: Array, tactels: Index, middle: Array, state: Array, w: Array,
+    coordinates: int, problem: Problem, room: Room, information: Array,
 ) -> tuple[float, int]:  # fmt: skip
     """Move the state to the least sum of squares; chi2 there and the steps taken.
 
     Args:
-        readings, weights: (T,), weights 1/sd and 0 for what is left out (a dead tactel).
-        tactels, middle: Which they are, and the window's middle [m].
-        state: Start, and then the answer (6,).
-        ridge: Keep the flat curvature at its given value: the one-curvature algorithm.
-        information: Out, J'WJ with the prior's part (6, 6).
+        coordinates: BY_ELLIPSE, BY_CURVATURE or ON_RIDGE; on the ridge w moves too.
+        information: Out, J'WJ with the prior's part (6, 6). For the rest see `fit_window`.
     """
+    by_ellipse, ridge = coordinates == BY_ELLIPSE, coordinates == ON_RIDGE
     n = 5 if ridge else 6
-    finger, flat = problem.material[3], problem.material[4]
-    w, w_trial, trial = ridge_point(state, finger, flat), np.zeros(2), state.copy()
-    if ridge:
-        put_on_ridge(state, w, finger, flat)
-    digits = ROUGH_DIGITS
-    chi2, total = evaluate(readings, weights, tactels, state, digits, problem, room)
+    w_trial, trial = w.copy(), state.copy()
+    chi2, total = evaluate(readings, weights, tactels, state, by_ellipse, problem, room)
     information[:], g = room.A, room.g.copy()
     L, step, damping = np.zeros((6, 6)), np.zeros(6), 1e-3
     A_n, g_n = information, g
@@ -239,22 +240,54 @@ def fit_window(
         for i in range(n):
             fall += step[i] * g_n[i]
         better = False
-        if allowed(trial, middle, problem.box):
+        if allowed(trial, middle, problem.box, 0.02 if by_ellipse else 1e-5):
             chi2_trial, total_trial = evaluate(
-                readings, weights, tactels, trial, digits, problem, room
+                readings, weights, tactels, trial, by_ellipse, problem, room
             )
             better = total_trial <= total
             if better:
                 state[:], w[:], chi2, total = trial, w_trial, chi2_trial, total_trial
                 information[:], g[:] = room.A, room.g
         damping = max(0.1 * damping, 1e-12) if better else 8.0 * damping
-        if digits < DIGITS and fall < ROUGH * (1.0 + 0.01 * total):
-            digits, damping = DIGITS, min(damping, 1e-3)
-            chi2, total = evaluate(readings, weights, tactels, state, digits, problem, room)
-            information[:], g[:] = room.A, room.g
-        elif fall < CONVERGED * (1.0 + total) or damping > 1e12:
+        if fall < (ROUGH * (100.0 + total) if by_ellipse else CONVERGED * (1e-6 + total)):
+            return chi2, done + 1
+        if damping > 1e12:
             return chi2, done + 1
     return chi2, MOST_STEPS
+
+
+@compiled
+def fit_window(
+    readings: Array, weights: Array, tactels: Index, middle: Array, state: Array, ridge: bool,
+    problem: Problem, room: Room, information: Array,
+) -> tuple[float, int]:  # fmt: skip
+    """Move the state first roughly by the ellipse, nearly linear, then by the curvature.
+
+    Args:
+        readings, weights: (T,), weights 1/sd and 0 for what is left out (a dead tactel).
+        tactels, middle: Which they are, and the window's middle [m].
+        state: Start, and then the answer (6,).
+        ridge: Keep the flat curvature at its given value: the one-curvature algorithm.
+    Returns:
+        chi2 of the readings and the steps taken.
+    """
+    modulus, finger, flat = problem.material[0], problem.material[3], problem.material[4]
+    w = np.zeros(2)
+    ellipse_into(state[3:6], np.exp(state[2]), modulus, room.M, room.M_J)
+    state[3:6] = room.M
+    _, rough = descend(
+        readings, weights, tactels, middle, state, w, BY_ELLIPSE, problem, room, information
+    )
+    room.M[:] = state[3:6]
+    curvature_into(room.M, np.exp(state[2]), modulus, state[3:6])
+    if ridge:
+        w[:] = ridge_point(state, finger, flat)
+        put_on_ridge(state, w, finger, flat)
+    coordinates = ON_RIDGE if ridge else BY_CURVATURE
+    chi2, steps = descend(
+        readings, weights, tactels, middle, state, w, coordinates, problem, room, information
+    )
+    return chi2, rough + steps
 
 
 @compiled

@@ -119,25 +119,23 @@ def _any_sums(kind: int, row: Array, x: float, y: float, p: Array, u: Array, n: 
 
 
 @compiled
-def readings_into(
-    state: Array, modulus: float, compliance: float, depth: float, digits: float, kind: int,
-    rows: Array, positions: Array, tactels: Index, readings: Array, J: Array, M: Array, M_J: Array,
-    u: Array, p: Array,
+def ellipse_readings(
+    state: Array, M: Array, quadrature: tuple[float, float], compliance: float, kind: int,
+    rows: Array, positions: Array, tactels: Index, readings: Array, J: Array, u: Array, p: Array,
 ) -> None:  # fmt: skip
-    """Write readings of the tactels named and their derivatives over the state.
+    """Write readings of the tactels named under a given ellipse, and their derivatives.
 
     Args:
-        state: x_0, y_0, ln F and the relative curvature, see `STATE`.
-        modulus, compliance: E* [Pa]; response to reading [1/N m^2].
-        depth, digits: Of the quadrature.
+        state: x_0, y_0, ln F; the rest is not read.
+        M: Ellipse M_xx, M_yy, M_xy [m].
+        quadrature: Depth [m] and digits.
+        compliance: Response to reading, per newton.
         kind, rows, positions: Of the response model.
         tactels: Indices into rows and positions, (T,).
-        readings, J: Out, (T,) and (T, 6).
-        M, M_J: Out, ellipse and its derivatives, (3,) and (3, 4).
+        readings, J: Out, (T,) and (T, 6), over x_0, y_0, ln F, M_xx, M_yy, M_xy.
         u, p: Room for the nodes, (3, N) and (2, N).
     """
-    ellipse_into(state[3:6], np.exp(state[2]), modulus, M, M_J)
-    n = disk_nodes(M, depth, digits, u, p)
+    n = disk_nodes(M, quadrature[0], quadrature[1], u, p)
     scale = compliance * np.exp(state[2])
     for i in range(len(tactels)):
         t = tactels[i]
@@ -147,10 +145,18 @@ def readings_into(
         else:
             s = _any_sums(kind, rows[t], x, y, p, u, n)
         readings[i] = scale * s[0]
-        J[i, 0], J[i, 1] = scale * s[1], scale * s[2]
-        for j in range(4):
-            J[i, 2 + j] = scale * (s[3] * M_J[0, j] + s[4] * M_J[1, j] + s[5] * M_J[2, j])
-        J[i, 2] += readings[i]
+        J[i, 0], J[i, 1], J[i, 2] = scale * s[1], scale * s[2], scale * s[0]
+        J[i, 3], J[i, 4], J[i, 5] = scale * s[3], scale * s[4], scale * s[5]
+
+
+@compiled
+def over_curvature(J: Array, M_J: Array) -> None:
+    """Turn derivatives over the ellipse into those over the relative curvature, in place."""
+    for i in range(len(J)):
+        xx, yy, xy = J[i, 3], J[i, 4], J[i, 5]
+        J[i, 2] += xx * M_J[0, 0] + yy * M_J[1, 0] + xy * M_J[2, 0]
+        for j in range(1, 4):
+            J[i, 2 + j] = xx * M_J[0, j] + yy * M_J[1, j] + xy * M_J[2, j]
 
 
 @compiled
@@ -158,17 +164,19 @@ def _all_readings(
     states: Array, modulus: float, compliance: float, depth: float, digits: float, kind: int,
     rows: Array, positions: Array, J: Array,
 ) -> Array:  # fmt: skip
-    """`readings_into` of every tactel for each state; J (B or 0, T, 6) is filled if it has room."""
+    """Readings of every tactel for each state; J (B or 0, T, 6) is filled if it has room."""
     T = len(positions)
     out, slopes, every = np.empty((len(states), T)), np.empty((T, 6)), np.arange(T)
     M, M_J = np.empty(3), np.empty((3, 4))
     u, p = np.empty((3, MOST_NODES**2)), np.empty((2, MOST_NODES**2))
     for i in range(len(states)):
-        readings_into(
-            states[i], modulus, compliance, depth, digits, kind, rows, positions, every, out[i],
-            slopes, M, M_J, u, p,
+        ellipse_into(states[i, 3:6], np.exp(states[i, 2]), modulus, M, M_J)
+        ellipse_readings(
+            states[i], M, (depth, digits), compliance, kind, rows, positions, every, out[i],
+            slopes, u, p,
         )  # fmt: skip
         if len(J):
+            over_curvature(slopes, M_J)
             J[i] = slopes
     return out
 

@@ -55,7 +55,8 @@ def solve(
     first[:, :2] += windows.middles[rows]
     _keep_better(solved, rows, first, windows, weights, problem, ridge, always=True)
     freedom = np.maximum(windows.live.sum(axis=1) - 6, 1)
-    poor = touched & ((solved.chi2 > freedom * POOR_FIT**2) | (solved.steps >= MOST_STEPS))
+    poor = solved.chi2 > freedom * POOR_FIT**2
+    poor = touched & ((poor & (not ridge)) | (solved.steps >= MOST_STEPS))
     rows = np.flatnonzero(poor)
     if len(rows):
         others = starts(windows.readings[rows], weights[rows], array, best=1 + OTHER_STARTS)
