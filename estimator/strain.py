@@ -51,7 +51,7 @@ from estimator.strain_solve import Curvatures, Solved, solve
 from estimator.strain_window import Windows, checked_frames, choose_windows
 from estimator.vectors import Array, Mask
 
-FLAT_PRIOR = (5.0, 5.0)  # mean and sd of the flat curvature [1/m]: sensor.md; 200 mm, give or take
+FLAT_PRIOR = (10.0, 10.0)  # mean, sd of the flat curvature [1/m]: 40 mm to flat within 1.5 sd
 MEASURED = 0.8  # of the prior's sd: above that the flat curvature is not measured
 SECOND = 0.1  # of the peak: less than this outside the window is no contact of its own
 DEPTH_STEP = 1e-3

@@ -97,3 +97,22 @@ def test_gain_spread_turns_less_than_misplacement():
     """Gains off by 3 %: 1.2 degrees; places off by .1 mm: position dependent, much more."""
     gain, place = (np.abs(readings(**w)[0]) for w in ({"gain_spread": 0.03}, {"jitter": 1e-4}))
     assert np.quantile(gain, 0.8) < 0.7 * np.quantile(place, 0.8)
+
+
+def test_sticking_bands_make_the_angle_depend_on_the_place_as_the_paper_saw():
+    """'as much as 12 degrees in some cases as we varied the contact location' (7.2.6)."""
+    steps = np.linspace(-0.5, 0.5, 9)
+    grid = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    places = grid * [ARRAY.axial_pitch, ARRAY.arc_pitch]
+    psi = np.deg2rad(70.0)
+    u, v = np.array([np.cos(psi), np.sin(psi)]), np.array([-np.sin(psi), np.cos(psi)])
+    tensors = np.tile(np.outer(v, v) / R1 + K2 * np.outer(u, u), (len(places), 1, 1))
+    ranges = []
+    for stiffness in (0.0, 0.25):
+        finger = StrainFinger(ARRAY, StrainImperfections(band_stiffness=stiffness))
+        session, rng = finger.session(rng=np.random.default_rng(0)), np.random.default_rng(0)
+        touches = session.press(places, np.full(len(places), 2.0), tensors, rng=rng, exact=True)
+        found = read_strains(touches.readings, ARRAY, curvatures="two")
+        ranges.append(np.ptp(np.rad2deg(found.directions) % 180.0))
+    assert ranges[0] < 0.1
+    assert 8.0 < ranges[1] < 16.0
