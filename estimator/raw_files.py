@@ -5,7 +5,7 @@ An .npz file with N touches of one kind of sensor:
 | array         | shape        | unit, meaning                                                   |
 |---------------|--------------|-----------------------------------------------------------------|
 | `depth`       | (N, H, W)    | m, into the gel, NaN where a pixel is dead, *or*                 |
-| `strains`     | (N, 4, 4)    | -, compressive positive, NaN where a tactel is dead              |
+| `strains`     | (N, R, C)    | -, compressive positive (or N, of taxels), NaN where one is dead |
 | `pixel_pitch` | ()           | m, with `depth` only                                             |
 | `X_WS`        | (N, 4, 4)    | poses of the sensor in the world, rigid, translation in m        |
 | `finger`      | (N,)         | names of the touching fingertips, optional                       |
@@ -43,7 +43,7 @@ class RawTouches:
         X_WS: Poses of the sensor, (N, 4, 4).
         depth: Images [m], (N, H, W).
         pixel_pitch: [m], with depth.
-        strains: Compressive positive [-], (N, 4, 4).
+        strains: Compressive positive [-], or forces of taxels [N], of the whole array, (N, R, C).
         finger: N names, or none.
         sensor: Kind, empty if not said.
         pad_radius: Of a domed pad [m].
@@ -74,7 +74,7 @@ class RawTouches:
             if not self.pad_radius > 0.0:
                 raise ValueError(f"pad_radius: expected > 0 [m] or inf, got {self.pad_radius}")
         else:
-            _set(self, "strains", (N, 4, 4))
+            _set(self, "strains", (N, None, None))
         if len(self.finger) not in (0, N):
             raise ValueError(f"finger: expected {N} names or none, got {len(self.finger)}")
 

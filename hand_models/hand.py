@@ -149,6 +149,19 @@ class HandPose:
         fingers = self.hand.fingers
         return _frozen([self.transform_tip_to_world(f).rotation @ f.pad_normal for f in fingers])
 
+    def link_axis(self, finger: Finger) -> Array:
+        """(3,) unit vector along the finger's last link in the world: from its last joint to the
+        pad, made perpendicular to the pad's normal. A cylindrical sensor lies along it."""
+        frame = self.hand.model.frames[finger.tip_frame_id]
+        row = self.hand.fingers.index(finger)
+        joint = self.X_WB.act(self.data.oMi[frame.parentJoint].translation)
+        n = self.pad_normals[row]
+        along = self.pad_centres[row] - joint
+        along = along - (along @ n) * n
+        if np.linalg.norm(along) < 1e-6:  # a pad on the tip of the link has no such direction
+            along = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
+        return _frozen(along / np.linalg.norm(along))
+
     def pad_jacobian(self, finger: Finger) -> Array:
         """(3, nq) velocity of the pad's centre per joint velocity, world axes, base at rest."""
         return self._pad_twist(finger)[:3]

@@ -40,6 +40,7 @@ class Approach:
         contact_index: The waypoint at which the believed object is touched.
         standoff, overshoot: Lengths before and behind the contact [m].
         straightness: Largest distance of a waypoint from the straight line [m].
+        finger_axis: Along the finger's last link at the contact, world, unit, (3,).
     """
 
     finger: str
@@ -51,6 +52,7 @@ class Approach:
     standoff: float
     overshoot: float
     straightness: float
+    finger_axis: Array
 
 
 def plan_approaches(hand: Hand, reach: Reach) -> tuple[Approach, ...]:
@@ -81,7 +83,7 @@ def approach_by_base(hand: Hand, reach: Reach, *, stroke: float = ARM_STROKE) ->
     tips = np.array([hand.at(reach.q, X_WB).pad_centres[row] for X_WB in bases])
     return Approach(
         finger.name, _frozen(path), bases, _frozen(tips), finger.pad_radius, contact,
-        stroke, stroke, 0.0,
+        stroke, stroke, 0.0, hand.at(reach.q, reach.X_WB).link_axis(finger),
     )  # fmt: skip
 
 
@@ -103,6 +105,7 @@ def _finger_approach(hand: Hand, reach: Reach, i: int, collision: HandCollision)
     return Approach(
         finger.name, _frozen(path[:end]), (reach.X_WB,), _frozen(tips[:end]), finger.pad_radius,
         contact, before, float(-along[end - 1]), float(off_line[:end].max()),
+        hand.at(path[contact], reach.X_WB).link_axis(finger),
     )  # fmt: skip
 
 

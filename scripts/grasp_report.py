@@ -9,6 +9,8 @@ from rich.table import Table
 
 from estimator.belief import update
 from estimator.contact import Contact, Miss
+from estimator.raw_files import RawTouches
+from estimator.raw_sensors import DepthPad, raw_sensor
 from estimator.surface import SurfaceOfRevolution
 from planner.explore import Step
 from planner.plan import Probe
@@ -74,7 +76,31 @@ def episode_of(
                     outcome=outcome,
                     before=BelievedAxis(belief.axis, belief.covariance),
                     after=BelievedAxis(after.axis, after.covariance),
+                    note="" if record.felt is None else "; ".join(record.felt.flags),
+                    signal=None if record.felt is None else record.felt.signal,
                 )
             )
             belief = after
     return Episode(surface, tuple(acts), conclusion=conclusion)
+
+
+def raw_touches(sensor: str, steps: list[Step], world: World) -> RawTouches | None:
+    """The raw signals of all touches that met the object; None where the sensor has none."""
+    probes = [probe for step in steps for probe in step.plan.probes]
+    felt = [
+        (probe.finger, record.felt)
+        for probe, record in zip(probes, world.records, strict=True)
+        if record.felt is not None and record.felt.signal is not None
+    ]
+    if not felt:
+        return None
+    signals = np.array([one.signal for _, one in felt])
+    poses = np.array([one.X_WS for _, one in felt])
+    fingers = tuple(finger for finger, _ in felt)
+    kind = raw_sensor(sensor).kind
+    if isinstance(kind, DepthPad):
+        return RawTouches(
+            poses, depth=signals, pixel_pitch=kind.pixel_pitch, pad_radius=kind.radius,
+            finger=fingers, sensor=sensor,
+        )  # fmt: skip
+    return RawTouches(poses, strains=signals, finger=fingers, sensor=sensor)

@@ -5,7 +5,8 @@ hand plans three contacts it can make, touches the true object (which the planne
 estimates the axis with its uncertainty, and touches again until the goal is met.
 
 Writes plan.json (every placement with joint angles and approaches), result.json (estimate, truth,
-one entry per round) and probes.html (the animated hand, no server needed) into --out.
+one entry per round), probes.html (the animated hand, no server needed) and, for a sensor of raw
+signals, raw.npz (what it reported; estimate_axis.py --raw reads it) into --out.
 
 Exit status: 0 goal met, 1 not met (and why), 2 bad input or an object out of the hand's reach.
 
@@ -26,13 +27,15 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import tyro
-from grasp_report import episode_of, print_round
+from grasp_report import episode_of, print_round, raw_touches
 from output_files import require_writable, write_whole
 from rich.console import Console
 
 from estimator.axis import Axis, angle_between, offset_at
 from estimator.belief import Belief
 from estimator.contact import Contact, Miss, SensorNoise
+from estimator.raw_files import write_raw
+from estimator.raw_sensors import RAW_SENSORS
 from estimator.records import estimate_record
 from estimator.sensors import sensor_noise
 from estimator.surface import SurfaceOfRevolution
@@ -45,8 +48,10 @@ from planner.options import PlannerOptions
 from planner.plan import NoPlan, Probe
 from planner.workspace import Workspace
 from sim_sensor.camera import coarse_view
-from sim_sensor.noise import simulated_sensor
+from sim_sensor.feeling import Sense
+from sim_sensor.noise import Session, simulated_sensor
 from sim_sensor.objects import load_object
+from sim_sensor.raw_sense import raw_sense
 from sim_sensor.view import write_page
 from sim_sensor.world import World
 
@@ -61,7 +66,8 @@ class Options:
     """What is touched: a built-in name (can, bottle, cone, cup, barrel, jar-lid, knob, vase, egg,
     spindle, paper-lathe, sphere) or a CSV file with columns r_mm,z_mm."""
     sensor: str = "gel"
-    """Tactile sensor: ideal, fearing1988, robotworld, taxel, gel, gel-good, gel-poor."""
+    """Tactile sensor. Readings with noise: ideal, fearing1988, robotworld, taxel, gel, gel-good,
+    gel-poor. Raw signals, simulated and read: fearing-strain, gel-depth, taxel-array."""
     prior_angle_deg: float = 15.0
     """How far the camera's axis is off in direction."""
     prior_offset_mm: float = 15.0
@@ -140,11 +146,18 @@ def _scenario(options: Options) -> Scenario:
             rng=rng,
         ),
         told=sensor_noise(options.sensor),
-        world=World(surface, simulated_sensor(options.sensor).session(rng=rng), rng=rng),
+        world=World(surface, _mounted(options.sensor, surface, rng), rng=rng),
         hand=load_hand(options.hand),
         goal=Goal(np.deg2rad(options.goal_angle_deg), 1e-3 * options.goal_offset_mm),
         planner=_planner_options(options),
     )
+
+
+def _mounted(name: str, surface: SurfaceOfRevolution, rng: np.random.Generator) -> Session | Sense:
+    """The sensor that feels the world, raw or at reading level."""
+    if name in RAW_SENSORS:
+        return raw_sense(name, surface, rng=rng)
+    return simulated_sensor(name).session(rng=rng)
 
 
 def _planner_options(options: Options) -> PlannerOptions:
@@ -161,7 +174,10 @@ def _planner_options(options: Options) -> PlannerOptions:
 
 def _rounds(scenario: Scenario, options: Options, console: Console) -> Iterator[Step]:
     def touch(probe: Probe) -> Contact | Miss:
-        return scenario.world.touch(probe.approach)
+        felt = scenario.world.touch(probe.approach, finger_axis_W=probe.approach.finger_axis)
+        if isinstance(felt, Miss):
+            return felt
+        return replace(felt, finger=probe.finger, sensor=options.sensor)
 
     steps = explore(
         scenario.hand,
@@ -223,10 +239,14 @@ def _conclude(
             write_page(options.out / "probes.html", scenario.hand, episode)
         write_whole(options.out / "plan.json", f"{plans}\n".encode())
         write_whole(options.out / "result.json", f"{told}\n".encode())
+        raw = raw_touches(options.sensor, steps, scenario.world)
+        if raw is not None:
+            write_raw(options.out / "raw.npz", raw)
     except OSError as failure:
         print(f"plan_grasp: {options.out}: cannot be written ({failure})", file=sys.stderr)
         return 2
-    console.print(f"Written: {options.out}/plan.json, result.json" + ", probes.html" * bool(steps))
+    also = ", probes.html" * bool(steps) + ", raw.npz" * (raw is not None)
+    console.print(f"Written: {options.out}/plan.json, result.json{also}")
     if met:
         console.print("[bold green]Goal met.[/]")
         return 0

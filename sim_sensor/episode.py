@@ -79,6 +79,7 @@ class Act:
         before: What was believed of the axis before.
         after: What is believed with this touch.
         note: Shown with the caption.
+        signal: The raw signal that was felt, rows and columns, shown as a small picture; or None.
     Raises:
         ValueError: Shapes that do not fit, not finite, or `stop` outside [0, K - 1].
     """
@@ -91,6 +92,7 @@ class Act:
     before: BelievedAxis
     after: BelievedAxis
     note: str = ""
+    signal: Array | None = None
 
     def __post_init__(self) -> None:
         path = frozen(self.path)
