@@ -18,6 +18,7 @@ from estimator.contact import Contact, SensorNoise
 from estimator.depth import read_depth
 from estimator.depth_noise import DepthNoise
 from estimator.local_surface import LocalSurface, contact_from, misplaced
+from estimator.raw_files import RawTouches
 from estimator.sensors import sensor_noise
 from estimator.strain import read_strains
 from estimator.strain_array import StrainArray, taxel_array
@@ -101,6 +102,51 @@ RAW_SENSORS: dict[str, RawSensor] = {
         RawSensor("taxel-array", taxel_array(), sensor_noise("taxel-array")),
     )
 }
+
+
+@dataclass(frozen=True, eq=False)
+class RawReading:
+    """One raw touch read.
+
+    Args:
+        contact: None where nothing was felt.
+        flags: What the reader says of the signal.
+        residual: Its misfit over the stated noise [-].
+    """
+
+    contact: Contact | None
+    flags: tuple[str, ...] = ()
+    residual: float = 0.0
+
+
+def read_touches(touches: RawTouches, sensor: RawSensor) -> tuple[RawReading, ...]:
+    """Every raw touch as a contact in the world.
+
+    Raises:
+        ValueError: Signals that this sensor does not have.
+    """
+    if isinstance(sensor.kind, DepthPad):
+        if touches.depth is None:
+            raise ValueError(f"{sensor.name} reads depth images, the touches hold strains")
+        sensor = with_depth(sensor, pixel_pitch=touches.pixel_pitch, radius=touches.pad_radius)
+        signals = touches.depth
+    else:
+        if touches.strains is None:
+            raise ValueError(f"{sensor.name} reads strains, the touches hold depth images")
+        signals = touches.strains
+    fingers = touches.finger or ("",) * len(touches)
+    return tuple(
+        _read_one(sensor, signal, X_WS, finger)
+        for signal, X_WS, finger in zip(signals, touches.X_WS, fingers, strict=True)
+    )
+
+
+def _read_one(sensor: RawSensor, signal: Array, X_WS: Array, finger: str) -> RawReading:
+    surface = sensor.read(signal)
+    if surface is None:
+        return RawReading(None, ("no contact",))
+    contact = sensor.contact(surface, X_WS, finger=finger)
+    return RawReading(contact, surface.flags, surface.residual)
 
 
 def raw_sensor(name: str) -> RawSensor:

@@ -12,7 +12,12 @@ along with the axis, and reported with its probability.
 Curvatures are per unit, null where the sensor saturated (flatter than it resolves). Finger and
 sensor may be left out; contacts that name the same one share its errors, which are estimated along.
 
-Example: python scripts/estimate_axis.py tests/data/table8.json
+With --raw the file holds what the sensors reported, depth images or strains with the pose of the
+sensor at each touch (an .npz file; its layout stands in estimator/raw_files.py), and is read first.
+
+Examples:
+    python scripts/estimate_axis.py tests/data/table8.json
+    python scripts/estimate_axis.py --raw out/raw.npz
 """
 
 from __future__ import annotations
@@ -29,12 +34,15 @@ from rich.console import Console
 from rich.table import Table
 
 from estimator.assumptions import Assumptions
-from estimator.contact import SensorNoise
+from estimator.contact import Contact, SensorNoise
 from estimator.estimate import AxisEstimate
 from estimator.fusion import estimate_axis
+from estimator.raw_files import read_raw
+from estimator.raw_sensors import RAW_SENSORS, raw_sensor, read_touches
 from estimator.records import estimate_record, read_contacts
 from estimator.sensors import sensor_noise
 
+CAUTIOUS = "robotworld"
 SUSPECT = 0.5  # probability of a gross error that is worth a word
 SHARED = {  # what a nuisance is called, its unit in SI, digits
     "direction_offset": ("rotation of the directions, deg", 180.0 / np.pi, 1),
@@ -47,11 +55,15 @@ SHARED = {  # what a nuisance is called, its unit in SI, digits
 class Options:
     """Command line of estimate_axis.py."""
 
-    file: tyro.conf.Positional[Path]
+    file: tyro.conf.Positional[Path | None] = None
     """JSON file of contacts."""
-    sensor: str = "robotworld"
+    raw: Path | None = None
+    """In place of it, an .npz file of raw touches."""
+    sensor: str | None = None
     """What the sensor is worth: ideal, fearing1988, robotworld, taxel, gel, gel-good, gel-poor.
-    The default is the most cautious: directions share an offset of about ten degrees."""
+    The default is the most cautious, robotworld: directions share an offset of about ten degrees.
+    Of raw touches, how they are read: fearing-strain, gel-depth, taxel-array; default: as the file
+    says."""
     direction_offset_deg: float | None = None
     """How far all directions of one sensor may be rotated alike; 0: not at all. Default: as the
     sensor says."""
@@ -74,7 +86,7 @@ class Options:
 def main() -> int:
     options = tyro.cli(Options, description=__doc__)
     try:
-        contacts = read_contacts(options.file, _noise(options))
+        contacts, notes = _contacts(options)
         wrong = [n for n in options.only if not 1 <= n <= len(contacts)]
         if wrong:
             raise ValueError(f"--only {wrong[0]}: the file holds contacts 1 to {len(contacts)}")
@@ -87,11 +99,34 @@ def main() -> int:
         print(json.dumps(estimate_record(estimate), indent=2))
     else:
         numbers = list(dict.fromkeys(options.only)) or list(range(1, len(contacts) + 1))
+        for note in notes:
+            print(note)
         _print(estimate, numbers)
     return 0
 
 
-def _noise(options: Options) -> SensorNoise:
+def _contacts(options: Options) -> tuple[list[Contact], list[str]]:
+    """The contacts of either kind of file, and what the reader says of raw touches."""
+    if (options.file is None) == (options.raw is None):
+        raise ValueError("expected one file: of contacts (JSON), or of raw touches (--raw)")
+    if options.file is not None:
+        return list(read_contacts(options.file, _noise(options, options.sensor or CAUTIOUS))), []
+    assert options.raw is not None
+    touches = read_raw(options.raw)
+    name = options.sensor or touches.sensor
+    if not name:
+        raise ValueError(f"--sensor: {options.raw} does not say which; {', '.join(RAW_SENSORS)}")
+    sensor = replace(raw_sensor(name), expected=_noise(options, name))
+    readings = read_touches(touches, sensor)
+    notes = [
+        f"touch {number}: {'; '.join(reading.flags)}"
+        for number, reading in enumerate(readings, start=1)
+        if reading.flags
+    ]
+    return [r.contact for r in readings if r.contact is not None], notes
+
+
+def _noise(options: Options, sensor: str) -> SensorNoise:
     """The sensor's noise, with what the options say of the errors its readings share."""
     shared = {
         "direction_offset": ("--direction-offset-deg", options.direction_offset_deg, np.pi / 180),
@@ -104,7 +139,7 @@ def _noise(options: Options) -> SensorNoise:
             if not 0.0 <= value < np.inf:
                 raise ValueError(f"{option} {value:g}: expected a number >= 0")
             asked[name] = value * unit
-    return replace(sensor_noise(options.sensor), **asked)
+    return replace(sensor_noise(sensor), **asked)
 
 
 def _assumptions(options: Options) -> Assumptions:

@@ -15,6 +15,8 @@ from estimator.surface import SurfaceOfRevolution
 from planner.explore import Step
 from planner.plan import Probe
 from sim_sensor.episode import Act, BelievedAxis, Episode
+from sim_sensor.feeling import Felt
+from sim_sensor.pictures import Signal
 from sim_sensor.world import World
 
 
@@ -57,8 +59,20 @@ def _felt(probe: Probe, contact: Contact) -> str:
     return f"{1e3 * abs(depth):.1f} mm {'farther' if depth > 0 else 'nearer'} than believed"
 
 
+def _shown(sensor: str, felt: Felt | None) -> Signal | None:
+    """The raw signal for the page, with what its brightest place means."""
+    if felt is None or felt.signal is None:
+        return None
+    kind, most = raw_sensor(sensor).kind, float(np.nanmax(felt.signal))
+    if isinstance(kind, DepthPad):
+        return Signal(felt.signal, f"{1e3 * most:.2f} mm deep")
+    if kind.measures == "pressure":
+        return Signal(felt.signal, f"{most:.2f} N on a taxel")
+    return Signal(felt.signal, f"{100 * most:.1f} % strain")
+
+
 def episode_of(
-    surface: SurfaceOfRevolution, world: World, steps: list[Step], conclusion: str
+    surface: SurfaceOfRevolution, world: World, steps: list[Step], conclusion: str, sensor: str = ""
 ) -> Episode:
     """Each touch with the belief just before and just after it."""
     acts: list[Act] = []
@@ -77,7 +91,7 @@ def episode_of(
                     before=BelievedAxis(belief.axis, belief.covariance),
                     after=BelievedAxis(after.axis, after.covariance),
                     note="" if record.felt is None else "; ".join(record.felt.flags),
-                    signal=None if record.felt is None else record.felt.signal,
+                    signal=_shown(sensor, record.felt),
                 )
             )
             belief = after

@@ -235,7 +235,7 @@ def _conclude(
         options.out.mkdir(parents=True, exist_ok=True)
         if steps:
             words = f"{error['angle_deg']:.2f} deg and {error['offset_mm']:.2f} mm from the truth"
-            episode = episode_of(scenario.surface, scenario.world, steps, words)
+            episode = episode_of(scenario.surface, scenario.world, steps, words, options.sensor)
             write_page(options.out / "probes.html", scenario.hand, episode)
         write_whole(options.out / "plan.json", f"{plans}\n".encode())
         write_whole(options.out / "result.json", f"{told}\n".encode())

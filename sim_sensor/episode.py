@@ -11,6 +11,7 @@ from estimator.axis import Axis, angle_between, offset_at
 from estimator.contact import Contact, Miss
 from estimator.surface import SurfaceOfRevolution
 from estimator.vectors import Array, finite_array, frozen
+from sim_sensor.pictures import Signal
 
 CHI2_95_OF_2 = 5.991  # 95 % quantile of chi squared with two degrees of freedom
 
@@ -79,7 +80,7 @@ class Act:
         before: What was believed of the axis before.
         after: What is believed with this touch.
         note: Shown with the caption.
-        signal: The raw signal that was felt, rows and columns, shown as a small picture; or None.
+        signal: The raw signal that was felt, shown as a small picture; or None.
     Raises:
         ValueError: Shapes that do not fit, not finite, or `stop` outside [0, K - 1].
     """
@@ -92,7 +93,7 @@ class Act:
     before: BelievedAxis
     after: BelievedAxis
     note: str = ""
-    signal: Array | None = None
+    signal: Signal | None = None
 
     def __post_init__(self) -> None:
         path = frozen(self.path)

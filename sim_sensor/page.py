@@ -25,6 +25,10 @@ PAGE = """<!DOCTYPE html>
   #legend small { color: #66707c; }
   #legend i { display: inline-block; width: 14px; height: 10px; margin-right: 8px;
               border-radius: 2px; }
+  #signals { left: auto; right: 16px; top: 48px; font-size: 13px; display: none; }
+  #signals figure { margin: 0 0 8px; }
+  #signals img { display: block; width: 132px; image-rendering: pixelated; border-radius: 3px; }
+  #signals b { font-weight: 600; }
   #caption { bottom: 16px; right: 16px; max-width: 900px; margin: 0 auto; }
   #caption b { font-size: 17px; }
   #said { white-space: pre-line; min-height: 5.9em; margin-bottom: 4px; }
@@ -38,6 +42,7 @@ PAGE = """<!DOCTYPE html>
 <div id="stage"></div>
 <div id="legend" class="card"><h1>{{TITLE}}</h1><ul>{{LEGEND}}</ul>
   <small>drag to turn, wheel to zoom</small></div>
+<div id="signals" class="card"></div>
 <div id="caption" class="card">
   <b id="head"></b><div id="said"></div>
   <div id="bar"><button id="play">Pause</button>
@@ -48,7 +53,7 @@ PAGE = """<!DOCTYPE html>
 <script>
 "use strict";
 const byId = (id) => document.getElementById(id);
-const captions = {{CAPTIONS}}, duration = {{DURATION}};
+const captions = {{CAPTIONS}}, duration = {{DURATION}}, signals = {{SIGNALS}};
 const viewer = new MeshCat.Viewer(byId("stage"));
 for (const command of {{COMMANDS}}) {
   viewer.handle_command_bytearray(Uint8Array.from(atob(command), (c) => c.charCodeAt(0)));
@@ -73,8 +78,30 @@ function playOrPause() {
   if (player.time >= duration - 0.02) { player.reset(); }
   player.play();
 }
+let shown = "";
+function showSignals(now) {
+  const last = new Map();
+  for (const signal of signals) {
+    if (signal.time <= now + 1e-6) { last.set(signal.finger, signal); }
+  }
+  const key = [...last.values()].map((s) => s.finger + s.time).join();
+  if (key === shown) { return; }
+  shown = key;
+  byId("signals").style.display = last.size ? "block" : "none";
+  byId("signals").replaceChildren(...[...last.values()].map((signal) => {
+    const figure = document.createElement("figure"), image = new Image();
+    const name = document.createElement("b"), words = document.createElement("span");
+    image.src = signal.image;
+    image.alt = "what the " + signal.finger + " felt";
+    name.textContent = signal.finger;
+    words.textContent = " " + signal.words;
+    figure.append(image, name, words);
+    return figure;
+  }));
+}
 function show() {
   const now = player.time;
+  showSignals(now);
   const caption = captions.filter((c) => c.time <= now + 1e-6).pop() || captions[0];
   if (byId("head").textContent !== caption.head) {
     byId("head").textContent = caption.head;

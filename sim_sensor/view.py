@@ -21,6 +21,7 @@ from hand_models.hand import Hand
 from sim_sensor import scene as colours
 from sim_sensor.episode import Episode
 from sim_sensor.page import PAGE
+from sim_sensor.pictures import picture
 from sim_sensor.scene import Scene, build_scene
 from sim_sensor.timeline import captions
 
@@ -62,6 +63,20 @@ def write_page(path: str | Path, hand: Hand, episode: Episode) -> Path:
     return path
 
 
+def _signals(scene: Scene, episode: Episode) -> list[dict[str, object]]:
+    """The raw pictures and the time from which each is its finger's last."""
+    return [
+        {
+            "time": beat.touch,
+            "finger": act.finger,
+            "words": act.signal.words,
+            "image": picture(act.signal),
+        }
+        for act, beat in zip(episode.acts, scene.beats, strict=True)
+        if act.signal is not None
+    ]
+
+
 def _render(scene: Scene, episode: Episode) -> str:
     """The page's text."""
     packed = [*scene.commands, scene.animation()]
@@ -76,6 +91,7 @@ def _render(scene: Scene, episode: Episode) -> str:
         "COMMANDS": _script([_packed(command) for command in packed]),
         "CAPTIONS": _script(captions(episode, scene.beats)),
         "MARKS": _script([beat.touch for beat in scene.beats]),
+        "SIGNALS": _script(_signals(scene, episode)),
         "EYE": _script(scene.camera.eye.tolist()),
         "TARGET": _script(scene.camera.target.tolist()),
         "DURATION": _script(scene.duration),
