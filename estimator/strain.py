@@ -166,10 +166,12 @@ def _two_contacts(
     seen = flat[np.arange(len(flat)), windows.outside]
     peak = windows.readings.max(axis=1)
     suspects = np.flatnonzero((windows.outside >= 0) & (seen > SECOND * peak))
+    two = np.zeros(len(flat), dtype=np.bool_)
+    if len(suspects) == 0:
+        return two
     expected = predicted_readings(states[suspects], array, model).reshape(-1, flat.shape[1])
     surplus = seen[suspects] - expected[np.arange(len(suspects)), windows.outside[suspects]]
     limit = SECOND * peak + NOISE_PEAKS * windows.sd.min(axis=1)
-    two = np.zeros(len(flat), dtype=np.bool_)
     two[suspects] = surplus > limit[suspects]
     return two
 

@@ -109,6 +109,8 @@ def _keep_better(
     ridge: bool, *, always: bool = False,
 ) -> None:  # fmt: skip
     """Fit these rows from these states; where that explains the readings better, keep it."""
+    if len(rows) == 0:
+        return
     states = np.ascontiguousarray(states)
     information, chi2, steps = fit_all(
         windows.readings[rows], weights[rows], windows.tactels[rows], windows.middles[rows],
