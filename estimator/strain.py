@@ -20,9 +20,10 @@ from estimator.response import ResponseModel
 from estimator.strain_array import StrainArray
 from estimator.strain_covariance import (
     LOOSE,
+    body_tensors,
     ellipses_of,
+    flat_curvatures,
     inverse_information,
-    relative_tensors,
     ridge_covariance,
     shared_errors,
 )  # fmt: skip
@@ -32,13 +33,13 @@ from estimator.strain_flags import (
     FLAGS,
     LONG,
     NOISE_PEAKS,
+    OFF_PRIOR,
     POOR,
     POOR_FIT,
     SATURATED,
     TWO,
     UMBILIC,
     before_fit,
-    flat_sd,
     near_edge,
     nothing_to_fit,
     too_long,
@@ -76,7 +77,8 @@ def read_strains(
         strains: (B, rows, columns) of the whole array, or one frame; compression positive, NaN
             where a tactel is dead.
         array: What was measured with.
-        curvatures: "map": both, the flat one with a prior. "two": both by maximum likelihood;
+        curvatures: "map": both, the flat one with a prior that steps back where the strains
+            contradict it. "two": both by maximum likelihood;
             needs 2 N or more. "one": the flat one is 0, as in the paper's experiments.
         flat_prior: Mean and standard deviation of the flat curvature [1/m]: for "map", and for
             "one" how much of it may have been left out.
@@ -115,15 +117,16 @@ def read_strains(
         TWO: _two_contacts(states, windows, frames, array, model),
         POOR: residuals > POOR_FIT,
         SATURATED: solved.saturated,
+        OFF_PRIOR: solved.off_prior,
     }
     for name, up in after.items():
         raised[:, FLAGS.index(name)] = up & touched
     covariances = widened(covariances, states, residuals, raised, array)
-    tensors = relative_tensors(states) - np.diag([0.0, array.curvature])
+    tensors = body_tensors(states, array)
     raised[:, FLAGS.index(UMBILIC)] = umbilic(tensors, covariances) & touched
     if curvatures == "map":
-        known = flat_sd(tensors, covariances) < MEASURED * flat_prior[1]
-        raised[:, FLAGS.index(BY_PRIOR)] = ~known & touched
+        known = flat_curvatures(tensors, covariances)[1] < MEASURED * flat_prior[1]
+        raised[:, FLAGS.index(BY_PRIOR)] = ~known & touched & ~solved.off_prior
     states, covariances = _without_touch(~touched, states, covariances, windows, array)
     return StrainReadings(
         array, states, covariances, ellipses, np.where(touched, indentations, 0.0), residuals,
@@ -137,7 +140,7 @@ def _covariances(
     """Of the states, by the algorithm that found them."""
     if curvatures != "one":
         return inverse_information(solved.information)
-    tensors = relative_tensors(solved.states) - np.diag([0.0, array.curvature])
+    tensors = body_tensors(solved.states, array)
     left_out = flat_prior[0] ** 2 + flat_prior[1] ** 2
     return ridge_covariance(solved.information, tensors, left_out, array)
 
@@ -163,10 +166,12 @@ def _two_contacts(
     seen = flat[np.arange(len(flat)), windows.outside]
     peak = windows.readings.max(axis=1)
     suspects = np.flatnonzero((windows.outside >= 0) & (seen > SECOND * peak))
+    two = np.zeros(len(flat), dtype=np.bool_)
+    if len(suspects) == 0:
+        return two
     expected = predicted_readings(states[suspects], array, model).reshape(-1, flat.shape[1])
     surplus = seen[suspects] - expected[np.arange(len(suspects)), windows.outside[suspects]]
     limit = SECOND * peak + NOISE_PEAKS * windows.sd.min(axis=1)
-    two = np.zeros(len(flat), dtype=np.bool_)
     two[suspects] = surplus > limit[suspects]
     return two
 

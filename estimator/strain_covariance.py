@@ -25,6 +25,21 @@ def inverse_information(information: Array) -> Array:
     return np.asarray(np.linalg.inv(whitened) * np.outer(scale, scale))
 
 
+def flat_curvatures(tensors: Array, covariances: Array) -> tuple[Array, Array]:
+    """The object's smaller curvature and its standard deviation [1/m], (B,) each."""
+    curvatures, vectors = np.linalg.eigh(tensors)
+    u = vectors[:, :, 0]
+    slope = np.zeros((len(u), 6))
+    slope[:, 3], slope[:, 4], slope[:, 5] = u[:, 0] ** 2, u[:, 1] ** 2, 2.0 * u[:, 0] * u[:, 1]
+    variance = np.einsum("bi,bij,bj->b", slope, covariances, slope)
+    return curvatures[:, 0], np.sqrt(variance)
+
+
+def body_tensors(states: Array, array: StrainArray) -> Array:
+    """Curvature of the object, the finger's taken away, (B, 2, 2)."""
+    return np.asarray(relative_tensors(states) - np.diag([0.0, array.curvature]))
+
+
 def ridge_covariance(
     information: Array, tensors: Array, second_moment: float, array: StrainArray
 ) -> Array:

@@ -19,8 +19,22 @@ TWO = "two contacts"
 POOR = "poor fit"
 SATURATED = "second curvature saturated"
 BY_PRIOR = "second curvature is the prior's"
+OFF_PRIOR = "second curvature against the prior"
 UMBILIC = "direction void, nearly umbilic"
-FLAGS = (NO_CONTACT, TOO_FEW, DEAD, BEYOND, LONG, EDGE, TWO, POOR, SATURATED, BY_PRIOR, UMBILIC)
+FLAGS = (
+    NO_CONTACT,
+    TOO_FEW,
+    DEAD,
+    BEYOND,
+    LONG,
+    EDGE,
+    TWO,
+    POOR,
+    SATURATED,
+    BY_PRIOR,
+    OFF_PRIOR,
+    UMBILIC,
+)
 
 NOISE_PEAKS = 6.0  # a peak below this many standard deviations is no contact
 POOR_FIT = 1.7  # rms residual over noise; chance alone passes it once in 3000 with 10 to spare
@@ -47,11 +61,11 @@ def nothing_to_fit(raised: Mask) -> Mask:
 
 
 def too_long(ellipses: Array, array: StrainArray) -> Mask:
-    """The ellipse covers more than the window and a sense depth around it, either way."""
+    """The ellipse covers more than the window and most of a sense depth around it."""
     half = np.sqrt(np.einsum("bij,bij->bi", ellipses, ellipses))  # rows' lengths: half extents
     reach = (
-        0.5 * array.window[1] * array.axial_pitch + array.depth,
-        0.5 * array.window[0] * array.arc_pitch + array.depth,
+        0.5 * array.window[1] * array.axial_pitch + 0.8 * array.depth,
+        0.5 * array.window[0] * array.arc_pitch + 0.8 * array.depth,
     )
     return np.asarray(np.any(half > reach, axis=1))
 
@@ -61,14 +75,6 @@ def near_edge(places: Array, middles: Array, array: StrainArray) -> Mask:
     reach = np.array([(array.window[1] - 2) * array.axial_pitch, 0.0])
     reach[1] = (array.window[0] - 2) * array.arc_pitch
     return np.asarray(np.any(np.abs(places - middles) > 0.5 * reach + 0.25 * array.depth, axis=1))
-
-
-def flat_sd(tensors: Array, covariances: Array) -> Array:
-    """Standard deviation of the object's smaller curvature [1/m], (B,)."""
-    u = np.linalg.eigh(tensors)[1][:, :, 0]
-    slope = np.zeros((len(u), 6))
-    slope[:, 3], slope[:, 4], slope[:, 5] = u[:, 0] ** 2, u[:, 1] ** 2, 2.0 * u[:, 0] * u[:, 1]
-    return np.asarray(np.sqrt(np.einsum("bi,bij,bj->b", slope, covariances, slope)))
 
 
 def umbilic(tensors: Array, covariances: Array) -> Mask:

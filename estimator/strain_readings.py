@@ -8,7 +8,7 @@ import numpy as np
 
 from estimator.local_surface import LocalSurface
 from estimator.strain_array import StrainArray
-from estimator.strain_covariance import relative_tensors, surface_covariance
+from estimator.strain_covariance import body_tensors, surface_covariance
 from estimator.strain_flags import FLAGS, nothing_to_fit
 from estimator.vectors import Array, Mask
 
@@ -48,7 +48,7 @@ class StrainReadings:
     @property
     def tensors(self) -> Array:
         """Curvature of the object along x and y, convex positive [1/m], (B, 2, 2)."""
-        return relative_tensors(self.states) - np.diag([0.0, self.array.curvature])
+        return body_tensors(self.states, self.array)
 
     @property
     def directions(self) -> Array:

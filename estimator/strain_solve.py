@@ -9,6 +9,7 @@ import numpy as np
 
 from estimator.response import ResponseModel
 from estimator.strain_array import StrainArray
+from estimator.strain_covariance import body_tensors, flat_curvatures, inverse_information
 from estimator.strain_fit import MOST_STEPS, Problem, fit_all
 from estimator.strain_flags import POOR_FIT
 from estimator.strain_start import starts
@@ -17,19 +18,24 @@ from estimator.vectors import Array, Index, Mask
 
 Curvatures = Literal["map", "two", "one"]
 OTHER_STARTS = 3
+CONTRADICTION = 3.0  # standard deviations between prior and strains
 FORCES = (-9.0, 7.0)  # ln F [N]
 
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """States (B, 6), J'WJ with the prior (B, 6, 6), chi2 of the readings, steps, and whether the
-    second curvature was held at 0 because it came out below, (B,)."""
+    """States (B, 6), J'WJ with the prior (B, 6, 6), chi2 of the readings and steps (B,).
+
+    `saturated`: the second curvature came out below 0 and was held there; `off_prior`: it was
+    fitted without the prior, which the strains contradict; (B,).
+    """
 
     states: Array
     information: Array
     chi2: Array
     steps: Array
     saturated: Mask
+    off_prior: Mask
 
 
 def solve(
@@ -48,6 +54,7 @@ def solve(
     solved = Solved(
         np.tile([0.0, 0.0, -7.0, 1.0, 1.0 + array.curvature, 0.0], (B, 1)),
         np.zeros((B, 6, 6)), np.zeros(B), np.zeros(B), np.zeros(B, dtype=np.bool_),
+        np.zeros(B, dtype=np.bool_),
     )  # fmt: skip
     weights = np.where(windows.live, 1.0 / windows.sd, 0.0)
     rows, ridge = np.flatnonzero(touched), curvatures == "one"
@@ -65,7 +72,28 @@ def solve(
             _keep_better(solved, rows, others[:, k], windows, weights, problem, ridge)
     if curvatures == "two" and convex:
         _saturate(solved, touched, array, windows, weights, problem)
+    if curvatures == "map":
+        _contradict(solved, touched, array, windows, weights, problem)
     return solved
+
+
+def _contradict(
+    solved: Solved, touched: Mask, array: StrainArray, windows: Windows, weights: Array,
+    problem: Problem,
+) -> None:  # fmt: skip
+    """Once more without the prior where it and the strains are far apart.
+
+    Their difference over its own deviation, from what the prior left of it: with posterior
+    variance V and the prior's P it is (kappa_2 - mean) / sqrt(P - V).
+    """
+    mean, rate = problem.prior
+    covariances = inverse_information(solved.information)
+    flat, sd = flat_curvatures(body_tensors(solved.states, array), covariances)
+    learnt = np.maximum(1.0 / rate**2 - sd**2, 1e-9 / rate**2)
+    solved.off_prior[:] = touched & (np.abs(flat - mean) > CONTRADICTION * np.sqrt(learnt))
+    rows = np.flatnonzero(solved.off_prior)
+    free = problem._replace(prior=(0.0, 0.0))
+    _keep_better(solved, rows, solved.states[rows], windows, weights, free, False, always=True)
 
 
 def _problem(array: StrainArray, model: ResponseModel, prior: tuple[float, float]) -> Problem:
@@ -81,6 +109,8 @@ def _keep_better(
     ridge: bool, *, always: bool = False,
 ) -> None:  # fmt: skip
     """Fit these rows from these states; where that explains the readings better, keep it."""
+    if len(rows) == 0:
+        return
     states = np.ascontiguousarray(states)
     information, chi2, steps = fit_all(
         windows.readings[rows], weights[rows], windows.tactels[rows], windows.middles[rows],

@@ -100,12 +100,14 @@ def _is_middle(tactels: Index, window: tuple[int, int]) -> Mask:
 
 def _best(windows: Array, alive: Mask, known: Templates, best: int) -> Array:
     score = windows @ known.readings.T
-    norm = np.ones_like(score)
+    square = np.ones((1, 1))
     if not alive.all():
-        norm = np.sqrt(np.maximum(alive.astype(np.float64) @ np.square(known.readings).T, 1e-12))
-    chosen = _ranked(score / norm, known.places, best)
+        square = np.maximum(alive.astype(np.float64) @ np.square(known.readings).T, 1e-12)
+        score /= square**0.5
+    chosen = _ranked(score, known.places, best)
     rows = np.arange(len(score))[:, None]
-    force = score[rows, chosen] / (norm[rows, chosen] ** 2 * known.lengths[chosen])
+    square = np.broadcast_to(square, score.shape)[rows, chosen]
+    force = score[rows, chosen] / (square**0.5 * known.lengths[chosen])
     states = known.states[chosen]
     force = np.maximum(force, 1e-6)
     states[..., 2] = np.log(force)
