@@ -44,13 +44,13 @@ class GelPad:
         ValueError: A number that is not of a pad.
     """
 
-    pitch: float = 0.2e-3
+    pitch: float = 0.25e-3
     size: tuple[float, float] = (16e-3, 12e-3)
     radius: float = np.inf
     thickness: float = 3e-3
     modulus: float = 0.25e6
     poisson: float = 0.48
-    white: float = 5e-6
+    white: float = 0.0
     correlated: float = 0.03e-3
     length: float = 1.5e-3
     gain: float = 0.03
@@ -227,12 +227,10 @@ def _ellipse(
     a, b = M[:, 0, 0].copy(), M[:, 1, 1].copy()
     long = a > longest
     if np.any(long):
-        low, high = np.full(int(long.sum()), 1e-6), np.full(int(long.sum()), longest)
-        for _ in range(40):
-            middle = np.sqrt(low * high)
-            pair = ellipse_curvatures(longest, middle, force[long], modulus)
-            low = np.where(pair[:, 1] > across[long], middle, low)
-            high = np.where(pair[:, 1] > across[long], high, middle)
+        middle, load = np.minimum(b[long], longest), force[long]
+        for _ in range(8):  # kappa_b goes nearly with 1 / b^2
+            pair = ellipse_curvatures(longest, middle, load, modulus)
+            middle = middle * np.sqrt(pair[:, 1] / across[long])
         a[long], b[long] = longest, middle
         k_a[long] = ellipse_curvatures(longest, middle, force[long], modulus)[:, 0]
     return a, b, indentation(a, b, force, modulus), k_a
