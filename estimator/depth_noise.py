@@ -6,7 +6,7 @@ two (sensor.md, section 4). Ordinary least squares does not know; its covariance
     cov = A^-1 (s_w^2 A + s_c^2 B) A^-1,    A = X'X,   B = X'RX,
 
 with R the correlation of all pairs of pixels in the domain. The rows X are summed in cells of
-about l / 2, and the correlation of means over cells of side q is again Gaussian to 2 %, with
+about l / 3, and the correlation of means over cells of side q is again Gaussian to 2 %, with
 l'^2 = l^2 + q^2 / 6 and its height l^2 / l'^2: R is separable and costs a few thousand products.
 """
 
@@ -132,7 +132,7 @@ def smooth_moment(
         length: l [mm].
     """
     h, w = inside.shape
-    G = max(1, round(0.5 * length / side))
+    G = max(1, round(0.35 * length / side))
     hs, ws = (h + G - 1) // G, (w + G - 1) // G
     S, row = np.zeros((hs, ws, TERMS)), np.empty(TERMS)
     low_i, high_i, low_j, high_j = hs, 0, ws, 0

@@ -139,7 +139,7 @@ def covariance_into(
 
 @compiled
 def domain_spread(terms: Array, covariance: Array, radius: float, centre: Array) -> float:
-    """What a domain that follows the noise adds to variances: 1 + 16 (sd(kappa_b) / kappa_b)^2.
+    """What a domain that follows the noise adds to variances: 1 + 6 (sd(kappa_b) / kappa_b)^2.
 
     A curvature that comes out too large narrows its own domain, which lets the noise in further;
     the second-order term's size is measured (radii 10-60 mm, 1-5 N, l = 0-2 mm).
@@ -156,7 +156,7 @@ def domain_spread(terms: Array, covariance: Array, radius: float, centre: Array)
         for j in range(3):
             variance += sharp[i] * covariance[3 + i, 3 + j] * sharp[j]
     kappa = sharp[0] * xx + sharp[1] * xy + sharp[2] * yy
-    return float(1.0 + 16.0 * min(variance / max(kappa * kappa, 1e-12), 0.25))
+    return float(1.0 + 6.0 * min(variance / max(kappa * kappa, 1e-12), 0.25))
 
 
 @compiled

@@ -197,10 +197,10 @@ class GelSession:
         across = np.maximum(mean + D, 0.2)
         along, soft = np.minimum(mean - D, across), load.copy() if is_force else np.ones_like(load)
         longest = 0.75 * float(np.hypot(*pad.size))
-        for _ in range(4):
+        for _ in range(5 if is_force else 8):
             a, b, delta, k_a = _ellipse(along, across, soft, pad.effective_modulus, longest)
             stiffer = 1.0 + 0.5 * a * b / pad.thickness**2  # bonded layer, 1 + 2 S^2
-            soft = load / stiffer if is_force else soft * (load / delta) ** 1.5
+            soft = np.sqrt(soft * load / stiffer) if is_force else soft * (load / delta) ** 1.5
         shapes = np.column_stack([a * 1e3, b * 1e3, delta * 1e3, k_a * 1e-3, across * 1e-3])
         return np.column_stack([np.cos(angle), np.sin(angle), shapes]), soft * stiffer
 
