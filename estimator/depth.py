@@ -92,7 +92,7 @@ def _fit(
         least = max(least, 4.0 * float(np.hypot(*told[:2])))
     centres, terms, covariances = np.zeros((B, 2)), np.zeros((B, TERMS)), np.zeros((B, 6, 6))
     residuals, flags, noises = np.zeros(B), np.zeros(B, np.intp), np.tile(told, (B, 1))
-    pixels = max(1, int(CELL / pitch))
+    pixels = max(1, round(CELL / pitch))
     read_images(
         np.ascontiguousarray(images), pitch, pixels, radius, least,
         noises, centres, terms, covariances, residuals, flags,

@@ -27,31 +27,23 @@ def pool(image: Array, pitch: float, m: int, cells: Array) -> tuple[float, int]:
         cells: Out; mean depth, centroid x and y [mm] about the middle of the image, pixels.
     """
     rows, columns = image.shape
-    cells[:] = 0.0
     deepest, same = -np.inf, 0
-    for i in range(rows):
-        ci = i // m
-        y = (i - 0.5 * (rows - 1)) * pitch
-        for j in range(columns):
-            d = image[i, j]
-            if not np.isfinite(d):
-                continue
-            cj = j // m
-            cells[MEAN, ci, cj] += d
-            cells[X, ci, cj] += (j - 0.5 * (columns - 1)) * pitch
-            cells[Y, ci, cj] += y
-            cells[COUNT, ci, cj] += 1.0
-            if d > deepest:
-                deepest, same = d, 1
-            elif d == deepest:
-                same += 1
     for ci in range(cells.shape[1]):
         for cj in range(cells.shape[2]):
-            count = cells[COUNT, ci, cj]
-            if count > 0.0:
-                cells[MEAN, ci, cj] /= count
-                cells[X, ci, cj] /= count
-                cells[Y, ci, cj] /= count
+            total, sx, sy, n = 0.0, 0.0, 0.0, 0
+            for i in range(ci * m, min(ci * m + m, rows)):
+                for j in range(cj * m, min(cj * m + m, columns)):
+                    d = image[i, j]
+                    if np.isnan(d):
+                        continue
+                    total, sx, sy, n = total + d, sx + j, sy + i, n + 1
+                    if d >= deepest:
+                        same = same + 1 if d == deepest else 1
+                        deepest = d
+            share = 1.0 / max(n, 1)
+            cells[MEAN, ci, cj], cells[COUNT, ci, cj] = total * share, n
+            cells[X, ci, cj] = (sx * share - 0.5 * (columns - 1)) * pitch
+            cells[Y, ci, cj] = (sy * share - 0.5 * (rows - 1)) * pitch
     return deepest, same
 
 

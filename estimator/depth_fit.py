@@ -7,8 +7,8 @@ the fit: from the fitted relative curvatures and depth Hertz gives the contact e
     b^2 = 2 delta (E/K) / (kappa_a + kappa_b),    a/b = t^-0.636,   t = kappa_a / kappa_b
 
 (complete elliptic integrals E/K by Hamrock & Brewe's fit, 3 %: a domain needs no more), and the
-next fit uses |v| < 0.85 b across and nothing beyond 0.95 of the ellipse. (Half spaces only: a bonded
-layer is in contact farther out than its depth says, so the domain errs to the safe side.)
+next fit uses |v| < 0.85 b across and nothing beyond 0.95 of the ellipse. That is for a half space;
+a bonded layer is in contact farther out than its depth says: the domain errs to the safe side.
 
 Along a principal direction bodies are rather arcs than parabolas. To fourth order a sphere and a
 cylinder of any radius are z = q + 1/2 (g.x) x'H^2x + 1/4 q x'H^2x, q = 1/2 x'Hx; the two last terms
@@ -101,61 +101,72 @@ def inverse(A: Array, out: Array) -> bool:
 
 
 @compiled
-def centroid(cells: Array, inside: Mask, centre: Array) -> int:
-    """Write the middle of the domain (x, y) [mm] to `centre`; how many cells it has."""
-    n, weight = 0, 0.0
-    centre[:] = 0.0
-    for i in range(inside.shape[0]):
-        for j in range(inside.shape[1]):
-            if inside[i, j]:
-                n += 1
-                weight += cells[COUNT, i, j]
-                centre[0] += cells[COUNT, i, j] * cells[X, i, j]
-                centre[1] += cells[COUNT, i, j] * cells[Y, i, j]
-    if n:
-        centre /= weight
-    return n
-
-
-@compiled
-def fit_once(
-    cells: Array, inside: Mask, radius: float, centre: Array, terms: Array, inv: Array
-) -> bool:
-    """Least squares over the domain, about its middle; False where that has no solution.
+def gather(cells: Array, inside: Mask, radius: float, points: Array, centre: Array) -> int:
+    """The domain as a list, and its middle; how many cells it has.
 
     Args:
         cells: Of `pool`, (4, h, w).
         inside: The domain, (h, w).
         radius: Of the undeformed pad [mm], inf for a flat one.
-        centre: Middle of the domain, (2,).
+        points: Out: x, y, height of the body, pixels; (4, h w) of which the first are set.
+        centre: Out: (2,) [mm].
+    """
+    n, weight, sx, sy = 0, 0.0, 0.0, 0.0
+    for i in range(inside.shape[0]):
+        for j in range(inside.shape[1]):
+            if inside[i, j]:
+                x, y, w = cells[X, i, j], cells[Y, i, j], cells[COUNT, i, j]
+                points[0, n], points[1, n], points[3, n] = x, y, w
+                points[2, n] = dome(x, y, radius) - cells[MEAN, i, j]
+                sx, sy, weight = sx + w * x, sy + w * y, weight + w
+                n += 1
+    if n:
+        centre[0], centre[1] = sx / weight, sy / weight
+    return n
+
+
+@compiled
+def fit_once(points: Array, n: int, centre: Array, terms: Array, inv: Array) -> bool:
+    """Least squares over the domain, about its middle; False where that has no solution.
+
+    Args:
+        points, n, centre: Of `gather`.
         terms: In: of the fit before, about nearly the same point. Out: c, g, H of the *object's*
             height z(x) over the image plane [mm], [-], [1/mm].
         inv: Out: inverse normal matrix, (6, 6), pixels as weights.
     """
-    A, rhs, row = np.zeros((TERMS, TERMS)), np.zeros(TERMS), np.empty(TERMS)
-    for i in range(inside.shape[0]):
-        for j in range(inside.shape[1]):
-            if not inside[i, j]:
-                continue
-            x, y = cells[X, i, j] - centre[0], cells[Y, i, j] - centre[1]
-            z = dome(cells[X, i, j], cells[Y, i, j], radius) - cells[MEAN, i, j]
-            z -= beyond_quadratic(x, y, terms)
-            row_of(x, y, row)
-            for k in range(TERMS):
-                weighted = cells[COUNT, i, j] * row[k]
-                rhs[k] += weighted * z
-                for m in range(k + 1):
-                    A[k, m] += weighted * row[m]
-    for k in range(TERMS):
-        for m in range(k):
-            A[m, k] = A[k, m]
+    px, py, pz, pw = points[0, :n], points[1, :n], points[2, :n], points[3, :n]
+    g0, g1, h0, h1, h2 = terms[1], terms[2], terms[3], terms[4], terms[5]
+    w0 = wx = wy = xx = xy = yy = 0.0  # moments, named by their powers
+    x3 = x2y = xy2 = y3 = x4 = x3y = x2y2 = xy3 = y4 = 0.0
+    z0 = zx = zy = zxx = zxy = zyy = 0.0
+    for i in range(n):
+        x, y, w = px[i] - centre[0], py[i] - centre[1], pw[i]
+        hx, hy = h0 * x + h1 * y, h1 * x + h2 * y
+        beyond = 0.5 * (hx * hx + hy * hy) * (g0 * x + g1 * y + 0.25 * (x * hx + y * hy))
+        z = w * (pz[i] - beyond)
+        a, b, c = x * x, x * y, y * y
+        wa, wb, wc = w * a, w * b, w * c
+        w0, wx, wy, xx, xy, yy = w0 + w, wx + w * x, wy + w * y, xx + wa, xy + wb, yy + wc
+        x3, x2y, xy2, y3 = x3 + wa * x, x2y + wa * y, xy2 + wc * x, y3 + wc * y
+        x4, x3y, x2y2, xy3, y4 = x4 + wa * a, x3y + wa * b, x2y2 + wa * c, xy3 + wc * b, y4 + wc * c
+        z0, zx, zy = z0 + z, zx + z * x, zy + z * y
+        zxx, zxy, zyy = zxx + z * a, zxy + z * b, zyy + z * c
+    A = np.array(
+        (
+            (w0, wx, wy, 0.5 * xx, xy, 0.5 * yy),
+            (wx, xx, xy, 0.5 * x3, x2y, 0.5 * xy2),
+            (wy, xy, yy, 0.5 * x2y, xy2, 0.5 * y3),
+            (0.5 * xx, 0.5 * x3, 0.5 * x2y, 0.25 * x4, 0.5 * x3y, 0.25 * x2y2),
+            (xy, x2y, xy2, 0.5 * x3y, x2y2, 0.5 * xy3),
+            (0.5 * yy, 0.5 * xy2, 0.5 * y3, 0.25 * x2y2, 0.5 * xy3, 0.25 * y4),
+        )
+    )
     if not inverse(A, inv):
         return False
     for k in range(TERMS):
-        s = 0.0
-        for m in range(TERMS):
-            s += inv[k, m] * rhs[m]
-        terms[k] = s
+        lower = inv[k, 0] * z0 + inv[k, 1] * zx + inv[k, 2] * zy
+        terms[k] = lower + 0.5 * inv[k, 3] * zxx + inv[k, 4] * zxy + 0.5 * inv[k, 5] * zyy
     return True
 
 

@@ -6,7 +6,7 @@ two (sensor.md, section 4). Ordinary least squares does not know; its covariance
     cov = A^-1 (s_w^2 A + s_c^2 B) A^-1,    A = X'X,   B = X'RX,
 
 with R the correlation of all pairs of pixels in the domain. The rows X are summed in cells of
-about l / 2, and the correlation of means over cells of side q is again Gaussian to 2 %, with
+about l / 3, and the correlation of means over cells of side q is again Gaussian to 2 %, with
 l'^2 = l^2 + q^2 / 6 and its height l^2 / l'^2: R is separable and costs a few thousand products.
 """
 
@@ -22,6 +22,7 @@ from estimator.depth_fit import TERMS, beyond_quadratic, dome, row_of
 from estimator.vectors import Array, Mask
 
 LENGTHS = np.array((0.0, 0.25, 0.4, 0.6, 0.9, 1.3, 2.0, 3.0))  # tried where none is told [mm]
+_UNSEEN = 2.0
 _LIKELY, _SPREAD = 1.3, 0.6  # of those: [mm], sd of the logarithm
 
 
@@ -131,7 +132,7 @@ def smooth_moment(
         length: l [mm].
     """
     h, w = inside.shape
-    G = max(1, int(0.5 * length / side))
+    G = max(1, round(0.35 * length / side))
     hs, ws = (h + G - 1) // G, (w + G - 1) // G
     S, row = np.zeros((hs, ws, TERMS)), np.empty(TERMS)
     low_i, high_i, low_j, high_j = hs, 0, ws, 0
@@ -154,16 +155,20 @@ def smooth_moment(
     for i in range(low_i, high_i):
         for j in range(low_j, high_j):
             for m in range(max(low_j, j - reach), min(high_j, j + reach + 1)):
+                c = kernel[abs(m - j)]
                 for k in range(TERMS):
-                    T[i, j, k] += kernel[abs(m - j)] * S[i, m, k]
+                    T[i, j, k] += c * S[i, m, k]
     B[:] = 0.0
     for i in range(low_i, high_i):
-        for m in range(max(low_i, i - reach), min(high_i, i + reach + 1)):
-            c = kernel[abs(m - i)]
-            for j in range(low_j, high_j):
+        for j in range(low_j, high_j):
+            row[:] = 0.0
+            for m in range(max(low_i, i - reach), min(high_i, i + reach + 1)):
+                c = kernel[abs(m - i)]
                 for k in range(TERMS):
-                    for n in range(k + 1):
-                        B[k, n] += c * S[i, j, k] * T[m, j, n]
+                    row[k] += c * T[m, j, k]
+            for k in range(TERMS):
+                for n in range(k + 1):
+                    B[k, n] += S[i, j, k] * row[n]
     for k in range(TERMS):
         for n in range(k):
             B[n, k] = B[k, n]
@@ -232,7 +237,8 @@ def noise_of_residuals(
 
     From their mean square, which the fit has diminished (by what `expected_square` says), and
     their structure function at lags of one, two and four cells, which it hardly has. The length
-    has a log-normal prior: what varies more slowly than the domain is wide cannot be seen in it.
+    has a log-normal prior: what varies more slowly than the domain is wide cannot be seen in it,
+    and for that the smooth variance is doubled.
     """
     seen, pairs = np.zeros(4), np.zeros(4)
     h, w = inside.shape
@@ -277,4 +283,4 @@ def noise_of_residuals(
             cost += (rows[k, 0] * p + rows[k, 1] * q - 1.0) ** 2 if pairs[k] > 0.0 else 0.0
         if cost < best:
             best = cost
-            noise[0], noise[1], noise[2] = p**0.5, q**0.5, length
+            noise[0], noise[1], noise[2] = p**0.5, (_UNSEEN * q) ** 0.5, length

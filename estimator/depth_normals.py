@@ -75,7 +75,7 @@ def read_normals(
         told = np.array([noise.white, noise.correlated, noise.length * 1e3])
     centres, terms, covariances = np.zeros((B, 2)), np.zeros((B, TERMS)), np.zeros((B, 6, 6))
     residuals, flags, noises = np.zeros(B), np.zeros(B, np.intp), np.tile(told, (B, 1))
-    pixels = max(1, int(CELL / pitch))
+    pixels = max(1, round(CELL / pitch))
     _read_slopes(
         depth, np.ascontiguousarray(slopes), pitch, pixels, radius, least_depth * 1e3,
         noises, centres, terms, covariances, residuals, flags,

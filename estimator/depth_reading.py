@@ -10,11 +10,11 @@ from estimator.depth_fit import (
     FEWEST_CELLS,
     ROUNDS,
     TERMS,
-    centroid,
     domain,
     dome_terms,
     ellipse_of,
     fit_once,
+    gather,
 )
 from estimator.depth_noise import expected_square, noise_of_residuals, residuals, smooth_moment
 from estimator.vectors import Array, Index, Mask
@@ -30,7 +30,7 @@ FLAGS = (
     "directions undetermined (umbilic)",
 )
 NO_CONTACT, TWO, BORDER, SATURATED, POOR, SMALL, HOLLOW, UMBILIC = (1 << k for k in range(8))
-CELL = 0.35  # largest side of a cell [mm]
+CELL = 0.4  # about the side of a cell [mm]
 _START, _BLOB = 0.6, 0.5  # of the deepest cell
 _PLATEAU = 0.1  # of a contact's pixels equal to the deepest one: clipped
 POOR_RATIO = 1.6  # residual over noise
@@ -87,19 +87,20 @@ def fit_domain(
     hertz: Array,
 ) -> int:
     """Fit and domain in turn until the domain stays; flags."""
+    points = np.empty((4, inside.size))
     terms[:] = 0.0
-    n = centroid(cells, inside, centre)
+    n = gather(cells, inside, radius, points, centre)
     for _ in range(ROUNDS):
-        if n < FEWEST_CELLS or not fit_once(cells, inside, radius, centre, terms, inv):
+        if n < FEWEST_CELLS or not fit_once(points, n, centre, terms, inv):
             return SMALL
         if not ellipse_of(terms, radius, centre, longest, hertz):
             return HOLLOW
         x, y, before = centre[0], centre[1], n
         domain(cells, hertz, inside)
-        n = centroid(cells, inside, centre)
-        if n == before and x == centre[0] and y == centre[1]:
+        n = gather(cells, inside, radius, points, centre)
+        if n == before and abs(x - centre[0]) + abs(y - centre[1]) < 1e-3:
             break
-    if n < FEWEST_CELLS or not fit_once(cells, inside, radius, centre, terms, inv):
+    if n < FEWEST_CELLS or not fit_once(points, n, centre, terms, inv):
         return SMALL
     return 0
 
@@ -134,6 +135,28 @@ def covariance_into(
             for k in range(TERMS):
                 s += half[i, k] * inv[k, j]
             out[i, j] = noise[0] ** 2 * inv[i, j] + noise[1] ** 2 * s
+
+
+@compiled
+def domain_spread(terms: Array, covariance: Array, radius: float, centre: Array) -> float:
+    """What a domain that follows the noise adds to variances: 1 + 6 (sd(kappa_b) / kappa_b)^2.
+
+    A curvature that comes out too large narrows its own domain, which lets the noise in further;
+    the second-order term's size is measured (radii 10-60 mm, 1-5 N, l = 0-2 mm).
+    """
+    pad = np.empty(TERMS)
+    dome_terms(centre[0], centre[1], radius, pad)
+    xx, xy, yy = terms[3] - pad[3], terms[4] - pad[4], terms[5] - pad[5]
+    half = 0.5 * (xx - yy)
+    angle = 0.5 * np.arctan2(xy, half)  # of the sharper direction
+    c, s = np.cos(angle), np.sin(angle)
+    sharp = np.array((c * c, 2.0 * c * s, s * s))
+    variance = 0.0
+    for i in range(3):
+        for j in range(3):
+            variance += sharp[i] * covariance[3 + i, 3 + j] * sharp[j]
+    kappa = sharp[0] * xx + sharp[1] * xy + sharp[2] * yy
+    return float(1.0 + 6.0 * min(variance / max(kappa * kappa, 1e-12), 0.25))
 
 
 @compiled
@@ -180,6 +203,7 @@ def read_images(
         if np.isnan(noise[b, 0]):
             noise_of_residuals(cells, inside, centres[b], inv, side, pixels, misfit, noise[b])
         covariance_into(cells, inside, centres[b], inv, side, pixels, noise[b], B, covariances[b])
+        covariances[b] *= domain_spread(terms[b], covariances[b], radius, centres[b])
         expected = expected_square(cells, inside, inv, B, side, pixels, noise[b])
         residual[b] = (square / max(expected, 1e-30)) ** 0.5
         if residual[b] > POOR_RATIO:

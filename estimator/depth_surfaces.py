@@ -85,7 +85,7 @@ def surfaces_of(
     cov8[unfitted] = np.diag(np.square([p_sd, p_sd, p_sd, n_sd, n_sd, k_sd, k_sd, k_sd]))
     D = np.hypot(0.5 * (K[:, 0, 0] - K[:, 1, 1]), K[:, 0, 1])
     spread = np.sqrt(np.maximum(cov8[:, 7, 7], 0.25 * (cov8[:, 5, 5] + cov8[:, 6, 6])))
-    bits = np.where(2.0 * spread > D, bits | UMBILIC, bits)
+    bits = np.where((2.0 * spread > D) & ~unfitted, bits | UMBILIC, bits)
     touched = (bits & NO_CONTACT) == 0
     touched.setflags(write=False)
     return DepthReadings(

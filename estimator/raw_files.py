@@ -145,9 +145,10 @@ def write_raw(path: str | Path, touches: RawTouches) -> None:
 def _arrays(path: Path) -> dict[str, NDArray[Any]]:
     """All arrays of the file."""
     try:
-        with np.load(path, allow_pickle=False) as file:
-            if not isinstance(file, np.lib.npyio.NpzFile):
-                raise ValueError("expected an .npz file of named arrays, got a single array")
+        file = np.load(path, allow_pickle=False)
+        if not isinstance(file, np.lib.npyio.NpzFile):
+            raise ValueError("expected an .npz file of named arrays, got a single array")
+        with file:
             return {name: file[name] for name in file.files}
     except FileNotFoundError:
         raise ValueError("there is no such file") from None

@@ -44,13 +44,13 @@ class GelPad:
         ValueError: A number that is not of a pad.
     """
 
-    pitch: float = 0.2e-3
+    pitch: float = 0.25e-3
     size: tuple[float, float] = (16e-3, 12e-3)
     radius: float = np.inf
     thickness: float = 3e-3
     modulus: float = 0.25e6
     poisson: float = 0.48
-    white: float = 5e-6
+    white: float = 0.0
     correlated: float = 0.03e-3
     length: float = 1.5e-3
     gain: float = 0.03
@@ -197,10 +197,10 @@ class GelSession:
         across = np.maximum(mean + D, 0.2)
         along, soft = np.minimum(mean - D, across), load.copy() if is_force else np.ones_like(load)
         longest = 0.75 * float(np.hypot(*pad.size))
-        for _ in range(4):
+        for _ in range(5 if is_force else 8):
             a, b, delta, k_a = _ellipse(along, across, soft, pad.effective_modulus, longest)
             stiffer = 1.0 + 0.5 * a * b / pad.thickness**2  # bonded layer, 1 + 2 S^2
-            soft = load / stiffer if is_force else soft * (load / delta) ** 1.5
+            soft = np.sqrt(soft * load / stiffer) if is_force else soft * (load / delta) ** 1.5
         shapes = np.column_stack([a * 1e3, b * 1e3, delta * 1e3, k_a * 1e-3, across * 1e-3])
         return np.column_stack([np.cos(angle), np.sin(angle), shapes]), soft * stiffer
 
@@ -227,12 +227,10 @@ def _ellipse(
     a, b = M[:, 0, 0].copy(), M[:, 1, 1].copy()
     long = a > longest
     if np.any(long):
-        low, high = np.full(int(long.sum()), 1e-6), np.full(int(long.sum()), longest)
-        for _ in range(40):
-            middle = np.sqrt(low * high)
-            pair = ellipse_curvatures(longest, middle, force[long], modulus)
-            low = np.where(pair[:, 1] > across[long], middle, low)
-            high = np.where(pair[:, 1] > across[long], high, middle)
+        middle, load = np.minimum(b[long], longest), force[long]
+        for _ in range(8):  # kappa_b goes nearly with 1 / b^2
+            pair = ellipse_curvatures(longest, middle, load, modulus)
+            middle = middle * np.sqrt(pair[:, 1] / across[long])
         a[long], b[long] = longest, middle
         k_a[long] = ellipse_curvatures(longest, middle, force[long], modulus)[:, 0]
     return a, b, indentation(a, b, force, modulus), k_a

@@ -21,34 +21,24 @@ from estimator.compiled import compiled
 from estimator.depth_fit import dome
 from estimator.vectors import Array
 
-NODES = 33
+NODES = 25
 _LAST = 0.97  # of t
 
 
 def free_surface(a: Array, b: Array, delta: Array) -> Array:
-    """Tables of u / delta: value and slope over t of its three integrals, (B, NODES, 6)."""
+    """u / delta as cubics between nodes of t: of its three integrals, (B, NODES - 1, 3, 4)."""
     t = np.linspace(0.0, _LAST, NODES)
     c = np.sqrt(a * b)[:, None]
     root = c * t / (1.0 - t)
-    droot = c / (1.0 - t) ** 2
     s = root**2
     A, B = a[:, None] ** 2 + s, b[:, None] ** 2 + s
-    common = -2.0 * droot / np.sqrt(A * B)
-    layers = [
-        2.0 * elliprf(s, A, B), common,
-        elliprd(s, B, A) / 1.5, common / A,
-        elliprd(s, A, B) / 1.5, common / B,
-    ]  # fmt: skip
-    whole = 2.0 * elliprf(0.0, a**2, b**2)
-    return np.asarray(np.stack(layers, axis=-1) / whole[:, None, None])
-
-
-@compiled
-def _hermite(f0: float, d0: float, f1: float, d1: float, t: float, h: float) -> float:
-    rise = f1 - f0
-    return f0 + t * (
-        h * d0 + t * (3.0 * rise - h * (2.0 * d0 + d1) + t * (h * (d0 + d1) - 2.0 * rise))
-    )
+    whole = 2.0 * elliprf(0.0, a**2, b**2)[:, None]
+    slope = -2.0 * c / (1.0 - t) ** 2 / np.sqrt(A * B) / whole * t[1]
+    f = np.stack([2.0 * elliprf(s, A, B), elliprd(s, B, A) / 1.5, elliprd(s, A, B) / 1.5], axis=-1)
+    f /= whole[..., None]
+    d = np.stack([slope, slope / A, slope / B], axis=-1)
+    f0, d0, rise, d1 = f[:, :-1], d[:, :-1], np.diff(f, axis=1), d[:, 1:]
+    return np.stack([f0, d0, 3.0 * rise - 2.0 * d0 - d1, d0 + d1 - 2.0 * rise], axis=-1)
 
 
 @compiled
@@ -58,16 +48,14 @@ def outside(x: float, y: float, a: float, b: float, table: Array) -> float:
     half = 0.5 * (x2 + y2 - a2 - b2)
     s = half + (half * half + x2 * b2 + y2 * a2 - a2 * b2) ** 0.5
     root = max(s, 0.0) ** 0.5
-    h = _LAST / (NODES - 1)
-    t = min(root / (root + (a * b) ** 0.5), _LAST * 0.999999) / h
+    t = min(root / (root + (a * b) ** 0.5), _LAST * 0.999999) * ((NODES - 1) / _LAST)
     i = int(t)
     t -= i
-    p, q = table[i], table[i + 1]
-    return (
-        _hermite(p[0], p[1], q[0], q[1], t, h)
-        - x2 * _hermite(p[2], p[3], q[2], q[3], t, h)
-        - y2 * _hermite(p[4], p[5], q[4], q[5], t, h)
-    )
+    p = table[i]
+    whole = p[0, 0] + t * (p[0, 1] + t * (p[0, 2] + t * p[0, 3]))
+    along = p[1, 0] + t * (p[1, 1] + t * (p[1, 2] + t * p[1, 3]))
+    across = p[2, 0] + t * (p[2, 1] + t * (p[2, 2] + t * p[2, 3]))
+    return float(whole - x2 * along - y2 * across)
 
 
 @compiled
