@@ -1,7 +1,8 @@
 """Measure this project against what else one could do, on the same data in the same run.
 
-Two comparisons
+Comparisons
     touches      contacts the planner chose against random contacts the same hand reaches
+    loops        whole sessions to a goal, from raw signals and from readings with noise
     estimators   our estimator against others on the same contacts, accuracy and time as ratios
 
 The estimators compared
@@ -17,6 +18,7 @@ Exit status: 0 measured, 2 bad input.
 
 Examples:
     python scripts/benchmark.py touches --runs 20 --objects can bottle
+    python scripts/benchmark.py loops --sensors gel-depth --runs 20 --jobs 4
     python scripts/benchmark.py estimators --runs 20
     python scripts/benchmark.py estimators --contacts 3 10 --sensors gel --out ratios.json
     python scripts/benchmark.py estimators --help
@@ -32,6 +34,7 @@ for library in ("OMP", "OPENBLAS", "MKL", "NUMBA"):  # one core; read when numpy
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
 import benchmark_estimators  # noqa: E402
+import benchmark_loops  # noqa: E402
 import benchmark_touches  # noqa: E402
 import tyro  # noqa: E402
 from tyro.conf import subcommand  # noqa: E402
@@ -39,6 +42,7 @@ from tyro.conf import subcommand  # noqa: E402
 Touches = Annotated[
     benchmark_touches.Options, subcommand("touches", description=benchmark_touches.__doc__)
 ]
+Loops = Annotated[benchmark_loops.Options, subcommand("loops", description=benchmark_loops.__doc__)]
 Estimators = Annotated[
     benchmark_estimators.Options,
     subcommand("estimators", description=benchmark_estimators.__doc__),
@@ -46,7 +50,9 @@ Estimators = Annotated[
 
 
 def main() -> int:
-    options = tyro.cli(Touches | Estimators, description=__doc__)
+    options = tyro.cli(Touches | Loops | Estimators, description=__doc__)
+    if isinstance(options, benchmark_loops.Options):
+        return benchmark_loops.main(options)
     if isinstance(options, benchmark_touches.Options):
         return benchmark_touches.main(options)
     return benchmark_estimators.main(options)

@@ -24,6 +24,8 @@ from sim_sensor.tactels import StrainFinger, TactelSession
 _UP_W = np.array([0.0, 0.0, 1.0])
 FORCE = 3.0  # of a touch, median [N]
 FORCE_SPREAD = 0.1  # sd of its logarithm
+ARM_PLACE, ARM_TURN = 0.05e-3, float(np.deg2rad(0.2))  # errors of each touch, each axis
+MOUNTED_PLACE, MOUNTED_TURN = 0.1e-3, float(np.deg2rad(0.5))  # ... of a finger, once a session
 OFF_CENTRE = 2e-3  # where on a gel pad the object is met, sd along each axis [m]
 
 
@@ -34,11 +36,13 @@ class TactelSense:
     Args:
         sensor: What the reader is told.
         session: The finger as it is.
+        X_SM: Where it really sits (M) in its stated frame S, (4, 4).
         force: Median of a touch [N].
     """
 
     sensor: RawSensor
     session: TactelSession
+    X_SM: Array
     force: float = FORCE
 
     def feel(self, touched: Touched, *, rng: np.random.Generator) -> Felt:
@@ -50,7 +54,7 @@ class TactelSense:
         force = _force(self.force, rng)
         pressed = self.session.press(place, [force], _tensor(touched.truth, axes)[None], rng=rng)
         R_WS, p_S = _laid(axes, place, float(pressed.indentation[0]), array)
-        X_WS = _pose(R_WS, touched.truth.p - R_WS @ p_S)
+        X_WS = _pose(R_WS, touched.truth.p - R_WS @ p_S) @ np.linalg.inv(self.X_SM)
         return _read(self.sensor, pressed.readings[0], X_WS, rng)
 
 
@@ -90,7 +94,10 @@ def raw_sense(
     if isinstance(sensor.kind, DepthPad):
         pad = replace(GelPad(), pitch=sensor.kind.pixel_pitch, radius=sensor.kind.radius)
         return GelSense(sensor, pad.session(rng=rng), surface)
-    return TactelSense(sensor, StrainFinger(sensor.kind, ORDINARY).session(rng=rng))
+    session = StrainFinger(sensor.kind, ORDINARY).session(rng=rng)
+    tilt = MOUNTED_TURN * rng.standard_normal(3) * [1.0, 1.0, 0.0]  # the session has its own turn
+    mounted = _pose(Rotation.from_rotvec(tilt).as_matrix(), MOUNTED_PLACE * rng.standard_normal(3))
+    return TactelSense(sensor, session, mounted)
 
 
 def _force(median: float, rng: np.random.Generator) -> float:
@@ -99,17 +106,17 @@ def _force(median: float, rng: np.random.Generator) -> float:
 
 def _read(sensor: RawSensor, signal: Array, X_WS: Array, rng: np.random.Generator) -> Felt:
     """The reader's answer, at the pose that the arm believes."""
-    X_WS = frozen(_jolted(X_WS, sensor, rng))
+    X_WS = frozen(_jolted(X_WS, rng))
     surface = sensor.read(signal)
     if surface is None:
         return Felt(None, signal, X_WS)
     return Felt(sensor.contact(surface, X_WS), signal, X_WS, surface.flags)
 
 
-def _jolted(X_WS: Array, sensor: RawSensor, rng: np.random.Generator) -> Array:
-    """A pose off by what the sensor's mounting is known to."""
-    turn = Rotation.from_rotvec(sensor.turn * rng.standard_normal(3)).as_matrix()
-    return _pose(X_WS[:3, :3] @ turn, X_WS[:3, 3] + sensor.place * rng.standard_normal(3))
+def _jolted(X_WS: Array, rng: np.random.Generator) -> Array:
+    """A pose as an arm states it."""
+    turn = Rotation.from_rotvec(ARM_TURN * rng.standard_normal(3)).as_matrix()
+    return _pose(X_WS[:3, :3] @ turn, X_WS[:3, 3] + ARM_PLACE * rng.standard_normal(3))
 
 
 def _finger_axes(touched: Touched) -> Array:
