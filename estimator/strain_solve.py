@@ -46,10 +46,11 @@ def solve(
     curvatures: Curvatures,
     flat_prior: tuple[float, float],
     convex: bool,
+    digits: float,
 ) -> Solved:
     """The best state of each window touched; see `strain.read_strains` for the algorithms."""
     prior = (flat_prior[0], 1.0 / flat_prior[1]) if curvatures == "map" else (0.0, 0.0)
-    problem = _problem(array, model, prior)
+    problem = _problem(array, model, prior, digits)
     B = len(touched)
     solved = Solved(
         np.tile([0.0, 0.0, -7.0, 1.0, 1.0 + array.curvature, 0.0], (B, 1)),
@@ -96,12 +97,14 @@ def _contradict(
     _keep_better(solved, rows, solved.states[rows], windows, weights, free, False, always=True)
 
 
-def _problem(array: StrainArray, model: ResponseModel, prior: tuple[float, float]) -> Problem:
+def _problem(
+    array: StrainArray, model: ResponseModel, prior: tuple[float, float], digits: float
+) -> Problem:
     reach_y, reach_x = (0.5 * (n + 1) for n in array.window)
     x, y = reach_x * array.axial_pitch, reach_y * array.arc_pitch
     material = (array.effective_modulus, array.compliance, array.depth, array.curvature, 0.0)
     box = np.array([(-x, x), (-y, y), FORCES])
-    return Problem(model.kind, model.rows, model.positions, material, prior, box)
+    return Problem(model.kind, model.rows, model.positions, material, prior, box, digits)
 
 
 def _keep_better(
