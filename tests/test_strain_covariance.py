@@ -23,7 +23,7 @@ def grid(seed, n):
     with np.errstate(divide="ignore"):
         states, tensors, long_axis = touches(rng, R1=R1, R2=1.0 / k2, psi=psi, force=force)
     strains = readings(rng, states)
-    valid = (long_axis < 8.5e-3) & (strains.max(axis=(1, 2)) < 0.14)
+    valid = (long_axis < 8.3e-3) & (strains.max(axis=(1, 2)) < 0.14)
     return states[valid], tensors[valid], strains[valid], force[valid]
 
 

@@ -1,4 +1,4 @@
-"""Figure 14: worst errors by eqs. (73)-(80), against the prototype's values and the paper's bound."""
+"""Figure 14: worst errors by eqs. (73)-(80), against known values and the paper's bound."""
 
 from dataclasses import replace
 
@@ -19,9 +19,10 @@ def worst_angle(force, R2, array=PAPER):
     return np.rad2deg(errors[:, 2].max())
 
 
-@pytest.mark.parametrize(
-    ("force", "two", "one"), [(1, 57.9, 2.43), (2, 21.8, 1.32), (2.09, 20.5, 1.26)]
-)
+BOUNDS = [(1, 57.9, 2.43), (2, 21.8, 1.32), (2.09, 20.5, 1.26)]
+
+
+@pytest.mark.parametrize(("force", "two", "one"), BOUNDS)
 def test_bounds_of_both_algorithms(force, two, one):
     assert worst_angle(force, 7 * INCH) == pytest.approx(two, rel=0.03)
     assert worst_angle(force, np.inf) == pytest.approx(one, rel=0.03)
