@@ -10,6 +10,32 @@ ENOUGH = 5  # contacts from which a gross error can be told from an axis
 
 
 @dataclass(frozen=True)
+class Roughness:
+    """How far a real surface strays from a surface of revolution at the size of a fingertip.
+
+    Dents, seams and labels turn normals and bend the patch that a fingertip feels; no sensor's
+    noise knows of them. For a scanned product `scripts/scan.py` measures both.
+
+    Args:
+        normal: Standard deviation of the normal's tilt about each tangent axis [rad].
+        curvature: Of each of K_xy and half sum and half difference of K_xx and K_yy [1/m].
+    Raises:
+        ValueError: Negative or not finite.
+    """
+
+    normal: float = 0.0
+    curvature: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not 0.0 <= value < np.inf:
+                raise ValueError(f"roughness {name}: expected a number >= 0, got {value}")
+
+
+SMOOTH = Roughness()
+
+
+@dataclass(frozen=True)
 class Assumptions:
     """Choices of the model. The sizes of the nuisance states are those of each contact's noise.
 
@@ -20,6 +46,7 @@ class Assumptions:
         gross_error: Probability that a contact is grossly wrong, from five contacts up [-].
         slope: Standard deviation of the profile's slope angle, for gently tapered objects [rad];
             None, the default, assumes nothing of the shape.
+        rough: What touches of this kind of object err beyond their sensor's noise.
     Raises:
         ValueError: A probability outside [0, 0.5), or a slope that is not in (0, pi/2).
     """
@@ -29,6 +56,7 @@ class Assumptions:
     position_bias: bool = True
     gross_error: float = 0.02
     slope: float | None = None
+    rough: Roughness = SMOOTH
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.gross_error < 0.5:

@@ -20,6 +20,7 @@ class ContactSets:
         directions: Principal directions in no order, rows unit, (B, n, 2, 3).
         curvatures: Along each row, NaN where saturated [1/m], (B, n, 2).
         noise: Of every contact.
+        covariances: Of each contact's own errors, as in `Contact.covariance`, (B, n, 8, 8).
         fingers, sensors: Whose tip and which sensor made contact j of each set; n names or none.
     Raises:
         ValueError: Shapes that do not match.
@@ -32,6 +33,7 @@ class ContactSets:
     noise: SensorNoise
     fingers: tuple[str, ...] = ()
     sensors: tuple[str, ...] = ()
+    covariances: Array | None = None
 
     def __post_init__(self) -> None:
         B, n = np.shape(self.positions)[:2]
@@ -46,6 +48,9 @@ class ContactSets:
                 raise ValueError(
                     f"{name}: expected shape {shape}, got {np.shape(getattr(self, name))}"
                 )
+        if self.covariances is not None and np.shape(self.covariances) != (B, n, 8, 8):
+            shape = np.shape(self.covariances)
+            raise ValueError(f"covariances: expected shape {(B, n, 8, 8)}, got {shape}")
         for name in ("fingers", "sensors"):
             if len(getattr(self, name)) not in (0, n):
                 raise ValueError(f"{name}: expected {n} names or none, got {getattr(self, name)}")
@@ -70,6 +75,7 @@ class ContactSets:
                 self.noise,
                 finger=finger,
                 sensor=sensor,
+                covariance=None if self.covariances is None else self.covariances[i, j],
             )
             for j, (finger, sensor) in enumerate(self.owners)
         )

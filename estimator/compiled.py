@@ -16,6 +16,8 @@ from typing import Any, TypeVar, cast
 
 import numba
 
+from estimator.vectors import Array
+
 F = TypeVar("F", bound=Callable[..., Any])
 V3 = tuple[float, float, float]
 
@@ -45,6 +47,12 @@ def compiled(function: F) -> F:
         return cast(F, numba.njit(cache=True, error_model="numpy", fastmath=FAST)(function))
     finally:
         numba.config.CACHE_DIR = other
+
+
+@compiled
+def vector(row: Array, first: int) -> V3:
+    """Three numbers of a row."""
+    return (row[first], row[first + 1], row[first + 2])
 
 
 @compiled

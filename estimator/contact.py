@@ -8,7 +8,7 @@ for it. Row i of `directions` has the curvature `curvatures[i]`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -73,8 +73,12 @@ class Contact:
         noise: How far off all this may be.
         finger: Whose tip touched: contacts of one finger share its position bias.
         sensor: What was touched with: contacts of one sensor share its direction and scale offset.
+        covariance: Of this reading's own errors (p_x, p_y, p_n, n_x, n_y, K_xx, K_yy, K_xy), x
+            along directions[0], y along normal x directions[0], n along the normal, (8, 8); it
+            then takes the place of the independent errors that `noise` states. None for those.
     Raises:
-        ValueError: Wrong shape, not finite, not unit, or normal and directions not orthogonal.
+        ValueError: Wrong shape, not finite, not unit, normal and directions not orthogonal, or a
+            covariance that is not positive semidefinite.
     """
 
     position: Array
@@ -84,6 +88,7 @@ class Contact:
     noise: SensorNoise = field(repr=False)
     finger: str = ""
     sensor: str = ""
+    covariance: Array | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         position = finite_array("contact position", self.position, (3,))
@@ -95,6 +100,10 @@ class Contact:
             object.__setattr__(self, name, value)
         object.__setattr__(self, "directions", directions)
         object.__setattr__(self, "curvatures", curvatures)
+        if self.covariance is not None:
+            covariance = error_covariance("contact covariance", self.covariance)
+            object.__setattr__(self, "covariance", covariance)
+            object.__setattr__(self, "noise", summarised(covariance, self.noise))
 
     @property
     def umbilicity(self) -> float:
@@ -123,6 +132,37 @@ class Miss:
         object.__setattr__(self, "tip", finite_array("miss tip", self.tip, (3,)))
         if not (np.isfinite(self.radius) and self.radius >= 0.0):
             raise ValueError(f"miss radius: expected a number >= 0, got {self.radius}")
+
+
+def error_covariance(name: str, values: ArrayLike) -> Array:
+    """The covariance of a reading's eight errors, read-only.
+
+    Raises:
+        ValueError: Not of shape (8, 8), not finite, not symmetric or not positive semidefinite.
+    """
+    covariance = finite_array(name, np.asarray(values), (8, 8))
+    sd = np.sqrt(np.maximum(np.diag(covariance), 1e-30))
+    correlations = covariance / np.outer(sd, sd)  # so that one tolerance fits all units
+    if np.abs(correlations - correlations.T).max() > 1e-6:
+        raise ValueError(f"{name}: expected a symmetric matrix")
+    if np.linalg.eigvalsh(correlations)[0] < -1e-6:
+        raise ValueError(f"{name}: expected positive semidefinite, an eigenvalue is < 0")
+    return covariance
+
+
+def summarised(covariance: Array, noise: SensorNoise) -> SensorNoise:
+    """The same sensor, its independent errors those of a covariance (8, 8), each in one number."""
+    var = np.diag(covariance)
+    mean = 0.25 * (var[5] + var[6]) + 0.5 * covariance[5, 6]
+    half = 0.25 * (var[5] + var[6]) - 0.5 * covariance[5, 6]
+    return replace(
+        noise,
+        position=max(float(np.sqrt(np.mean(var[:3]))), 1e-9),
+        normal=max(float(np.sqrt(np.mean(var[3:5]))), 1e-9),
+        direction=0.0,
+        deviator=float(np.sqrt(max(half, var[7], 0.0))),
+        mean_curvature=max(float(np.sqrt(max(mean, 0.0))), 1e-9),
+    )
 
 
 def measured_contact(

@@ -10,22 +10,15 @@ import numpy as np
 
 from estimator.assumptions import Assumptions
 from estimator.axis import Axis
+from estimator.background import SPREAD
 from estimator.batches import AxisEstimates, ContactSets
 from estimator.contact import Contact, Miss, require_distinct
 from estimator.estimate import VERDICTS, AxisEstimate, Hypothesis, Nuisance
 from estimator.modes import Modes, find_modes
+from estimator.nuisances import Owner, State
 from estimator.planes import Labelling
 from estimator.prior import AxisPrior
-from estimator.problem import (
-    SPREAD,
-    Background,
-    Nuisances,
-    Owner,
-    State,
-    background_of,
-    nuisance_states,
-    nuisances_of,
-)
+from estimator.problem import Problems, pose_problems
 from estimator.readings import Readings, readings_of, readings_of_sets
 from estimator.telling import telling_contact, telling_words
 from estimator.vectors import Array, Index, frozen
@@ -54,26 +47,26 @@ def estimate_axis(
 
     Args:
         contacts: Two or more (with a prior any number), world frame, at distinct points.
-        prior: What is believed of axis and size; without one the axis is expected within about
-            two spreads of the contacts, any direction.
+        prior: What is believed of axis and size; without one the axis is expected about half
+            the contacts' spread from their centroid, with heavy tails, in any direction.
         misses: Where fingers met nothing; used only with a prior, which knows the size.
         assumptions: What is estimated along, and what is assumed of errors and shape.
     Returns:
         Axis, 4x4 covariance in the chart of `estimator.axis`, hypotheses, label probabilities,
-        verdict and reasons. Umbilic contacts, one common meridian or parallel, flat ends and
-        spheres give `undetermined`.
+        verdict and reasons. One common meridian or parallel, flat ends, spheres, and umbilic
+        contacts whose normals do not fix the axis by themselves give `undetermined`.
     Raises:
         ValueError: Fewer than two contacts, or two at one point.
     """
     require_distinct(contacts, minimum=2 if prior is None else 0)
-    readings = readings_of(contacts)
+    readings = readings_of(contacts, assumptions.rough)
     owners = [Owner(c.noise, c.finger, c.sensor) for c in contacts]
-    states = nuisance_states(owners, assumptions)
-    nuisances = nuisances_of(owners, states)
     priors = [] if prior is None else [prior]
-    background = _background(readings, priors, misses, assumptions)
-    modes = _modes(readings, nuisances, background)
-    size = prior.radius if prior is not None else float(background.lines[0, SPREAD])
+    problems, states = pose_problems(
+        readings, owners, priors=priors, misses=misses, assumptions=assumptions
+    )
+    modes = _modes(problems)
+    size = float(problems.background.lines[0, SPREAD])
     findings = judge(readings, modes, np.array([size]))
     estimate = _estimate(contacts, readings, states, modes, findings, size)
     if estimate.verdict != "ambiguous":
@@ -102,34 +95,17 @@ def estimate_axes(
         raise ValueError(f"contacts: at least 2 are needed in each set, got {n}")
     if len(priors) not in (0, 1, len(sets)):
         raise ValueError(f"prior: expected one or {len(sets)}, got {len(priors)}")
-    readings = readings_of_sets(sets)
+    readings = readings_of_sets(sets, assumptions.rough)
     owners = [Owner(sets.noise, finger, sensor) for finger, sensor in sets.owners]
-    states = nuisance_states(owners, assumptions)
-    nuisances = nuisances_of(owners, states)
-    background = _background(readings, priors, (), assumptions)
-    modes = _modes(readings, nuisances, background)
-    sizes = [p.radius for p in priors] if priors else background.lines[:, SPREAD]
-    findings = judge(readings, modes, np.broadcast_to(np.array(sizes), len(sets)))
+    problems, states = pose_problems(readings, owners, priors=priors, assumptions=assumptions)
+    modes = _modes(problems)
+    sizes = np.broadcast_to(problems.background.lines[:, SPREAD], len(sets))
+    findings = judge(readings, modes, sizes)
     return _estimates(states, modes, findings)
 
 
-def _background(
-    readings: Readings,
-    priors: Sequence[AxisPrior],
-    misses: Sequence[Miss],
-    assumptions: Assumptions,
-) -> Background:
-    return background_of(
-        readings,
-        priors,
-        misses,
-        slope=assumptions.sine_of_slope,
-        gross=assumptions.gross(readings.shape[1]),
-    )
-
-
-def _modes(readings: Readings, nuisances: Nuisances, background: Background) -> Modes:
-    modes = find_modes(readings, nuisances, background)
+def _modes(problems: Problems) -> Modes:
+    modes = find_modes(problems)
     if np.any(modes.peaks == 0):
         raise ValueError("contacts: no line has a finite likelihood, the numbers are absurd")
     return modes

@@ -8,30 +8,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimator.assumptions import Assumptions
-from estimator.compiled import across, compiled
+from estimator.compiled import across, compiled, vector
 from estimator.contact import SensorNoise
-from estimator.likelihood import (
-    LOCAL,
-    fill_derivatives,
-    fill_motions,
-    fit_of,
-    seen_from,
-    vector,
-)
-from estimator.modes import DRAMATICALLY_WORSE, find_modes
-from estimator.posterior import cost_at, work_space
+from estimator.likelihood import fill_derivatives, fit_of
+from estimator.modes import find_modes
+from estimator.nuisances import Owner
+from estimator.posterior import cost_at
 from estimator.prior import AxisPrior
-from estimator.problem import (
-    Background,
-    Nuisances,
-    Owner,
-    background_of,
-    nuisance_states,
-    nuisances_of,
-)
-from estimator.readings import Readings, exact_readings
+from estimator.problem import Problems, pose_problems, problem_at
+from estimator.readings import ERRORS, Readings, exact_readings
+from estimator.search import DRAMATICALLY_WORSE
+from estimator.sight import LOCAL, fill_motions, seen_from
 from estimator.surface import Geometry
 from estimator.vectors import Array
+from estimator.work import work_space
 
 WITH_ROTATION = 5  # parameters: the line's four and the common rotation
 
@@ -60,7 +50,7 @@ def contact_information(
 @compiled
 def _fill_information(readings: Readings, lines: Array, out: Array) -> None:
     gradient, fisher = np.zeros(LOCAL), np.zeros((LOCAL, LOCAL))
-    rows = np.zeros((8, LOCAL))
+    rows, lean = np.zeros((8, LOCAL)), np.zeros((3, ERRORS))
     for s in range(readings.shape[0]):
         a, u = vector(lines[s], 0), vector(lines[s], 3)
         E1, E2 = across(u)
@@ -68,8 +58,8 @@ def _fill_information(readings: Readings, lines: Array, out: Array) -> None:
             row = readings[s, i]
             seen = seen_from(row, a, u, (0.0, 0.0, 0.0), 0.0)
             fill_motions(seen, E1, E2, rows, WITH_ROTATION)
-            fit = fit_of(row, seen, 0.0)
-            fill_derivatives(row, seen, fit, 1.0, 0.0, gradient, fisher, rows, WITH_ROTATION)
+            fit = fit_of(row, seen, 0.0, lean)
+            fill_derivatives(row, seen, fit, 1.0, 0.0, lean, gradient, fisher, rows, WITH_ROTATION)
             for j in range(WITH_ROTATION):
                 for k in range(j + 1):
                     out[s, i, j, k] = fisher[j, k]
@@ -109,24 +99,22 @@ def label_log_odds(expected: Expected, noise: SensorNoise, prior: AxisPrior | No
     odds are those beyond which the estimator drops a line.
     """
     readings = exact_readings(expected.geometry, noise)
-    owned = [Owner(noise)] * readings.shape[1]
-    nuisances = nuisances_of(owned, nuisance_states(owned, Assumptions()))
+    owners = [Owner(noise)] * readings.shape[1]
     priors: Sequence[AxisPrior] = [] if prior is None else [prior]
-    background = background_of(readings, priors, (), slope=np.inf, gross=0.0)
-    modes = find_modes(readings, nuisances, background)
+    faultless = Assumptions(gross_error=0.0)
+    problems, _ = pose_problems(readings, owners, priors=priors, assumptions=faultless)
+    modes = find_modes(problems)
     wrong = np.any(modes.parallel_rows < 0.5, axis=2)
     cost = np.where(wrong, modes.cost, np.inf).min(axis=1)
     truth = np.zeros((len(readings), modes.x.shape[2]))
     truth[:, :3], truth[:, 3:6] = expected.points, expected.directions
     right = np.empty(len(readings))
-    _fill_costs(readings, nuisances, background, truth, right)
+    _fill_costs(problems, truth, right)
     return np.asarray(np.minimum(cost - right, DRAMATICALLY_WORSE))
 
 
 @compiled
-def _fill_costs(
-    readings: Readings, nuisances: Nuisances, background: Background, x: Array, out: Array
-) -> None:
-    work = work_space(x.shape[1] - 2, readings.shape[1])
-    for s in range(readings.shape[0]):
-        out[s] = cost_at(readings, nuisances, background, s, x[s], False, work)
+def _fill_costs(problems: Problems, x: Array, out: Array) -> None:
+    work = work_space(x.shape[1] - 2, problems.readings.shape[1])
+    for s in range(len(x)):
+        out[s] = cost_at(problem_at(problems, s), x[s], False, work)

@@ -10,7 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from estimator.contact import Contact, SensorNoise, error_covariance
 from estimator.vectors import Array, finite_array, frozen
 
 ERRORS = 8  # p_x p_y p_n [m], n_x n_y [rad], K_xx K_yy K_xy [1/m]
@@ -45,14 +47,14 @@ class LocalSurface:
     flags: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        shapes = {"position": (3,), "frame": (3, 3), "tensor": (2, 2), "covariance": (8, 8)}
+        covariance = error_covariance("local surface covariance", self.covariance)
+        object.__setattr__(self, "covariance", covariance)
+        shapes = {"position": (3,), "frame": (3, 3), "tensor": (2, 2)}
         for name, shape in shapes.items():
             values = finite_array(f"local surface {name}", getattr(self, name), shape)
             object.__setattr__(self, name, values)
         if np.abs(self.frame @ self.frame.T - np.eye(3)).max() > 1e-6:
             raise ValueError("local surface frame: expected orthonormal rows x, y, n")
-        if np.linalg.eigvalsh(_scaled(self.covariance))[0] < -1e-9:
-            raise ValueError("local surface covariance: expected positive semidefinite")
 
     @property
     def principal(self) -> tuple[Array, Array]:
@@ -61,7 +63,61 @@ class LocalSurface:
         return frozen(vectors.T @ self.frame[:2]), frozen(curvatures)
 
 
-def _scaled(covariance: Array) -> Array:
-    """As correlations, so that one tolerance fits metres, radians and curvatures."""
-    sd = np.sqrt(np.maximum(np.diag(covariance), 1e-30))
-    return np.asarray(covariance / np.outer(sd, sd))
+def contact_from(
+    surface: LocalSurface, X_WS: Array, noise: SensorNoise, *, finger: str = "", sensor: str = ""
+) -> Contact:
+    """The contact that a sensor at pose X_WS felt, in the world, with the reading's covariance.
+
+    Args:
+        X_WS: Pose of the sensor's frame in the world, homogeneous, (4, 4).
+        noise: What readings of this sensor share besides (offsets, biases); its independent
+            errors give way to the covariance.
+    Raises:
+        ValueError: Not a rigid pose.
+    """
+    X_WS = rigid("X_WS", X_WS)
+    R, p = X_WS[:3, :3], X_WS[:3, 3]
+    curvatures, vectors = np.linalg.eigh(surface.tensor)
+    angle = float(np.arctan2(vectors[1, 0], vectors[0, 0]))
+    x, y, n = surface.frame @ R.T
+    c, s = np.cos(angle), np.sin(angle)
+    turn = _turned_errors(angle)
+    return Contact(
+        position=R @ surface.position + p,
+        normal=n,
+        directions=np.vstack([c * x + s * y, c * y - s * x]),
+        curvatures=curvatures,
+        noise=noise,
+        finger=finger,
+        sensor=sensor,
+        covariance=turn @ surface.covariance @ turn.T,
+    )
+
+
+def rigid(name: str, X: ArrayLike) -> Array:
+    """A homogeneous pose, read-only.
+
+    Raises:
+        ValueError: Not of shape (4, 4), or no rotation with a translation.
+    """
+    pose = finite_array(name, np.asarray(X), (4, 4))
+    R = pose[:3, :3]
+    if np.abs(R @ R.T - np.eye(3)).max() > 1e-6 or np.linalg.det(R) < 0.0:
+        raise ValueError(f"{name}: expected a rotation in its first three rows and columns")
+    if not np.allclose(pose[3], [0.0, 0.0, 0.0, 1.0]):
+        raise ValueError(f"{name}: expected a last row of 0 0 0 1, got {pose[3].tolist()}")
+    return pose
+
+
+def _turned_errors(angle: float) -> Array:
+    """Errors along x, y as errors along axes turned by an angle about n, (8, 8)."""
+    c, s = np.cos(angle), np.sin(angle)
+    turn = np.zeros((8, 8))
+    turn[:2, :2] = turn[3:5, 3:5] = [[c, s], [-s, c]]
+    turn[2, 2] = 1.0
+    turn[5:, 5:] = [
+        [c * c, s * s, 2.0 * c * s],
+        [s * s, c * c, -2.0 * c * s],
+        [-c * s, c * s, c * c - s * s],
+    ]
+    return turn

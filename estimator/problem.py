@@ -1,14 +1,7 @@
-"""Everything that bears on the axis besides the contacts themselves, as arrays.
+"""The whole problem of one axis, or of many alike, as arrays that compiled code reads.
 
-    prior on the line      an AxisPrior; without one the line passes within about two spreads of
-                           the contacts' centroid, in any direction
-    size                   the prior's radius against that of every contact
-    nuisance states        common rotation and log-scale of each sensor, position bias of each
-                           finger, each with the standard deviation its `SensorNoise` names
-    misses                 a finger met nothing there
-
-State of a line: x = (a, u, nuisance...), a the foot of the origin. Parameters: (t1, t2, w1, w2) in
-the chart at the line, then the nuisance states.
+State of a line: x = (a, u, nuisance...), a the foot of the chart's origin. Parameters: (t1, t2,
+w1, w2) in the chart at the line, then the nuisance states.
 """
 
 from __future__ import annotations
@@ -16,140 +9,118 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import numpy as np
-
 from estimator.assumptions import Assumptions
-from estimator.contact import Miss, SensorNoise
+from estimator.background import SPREAD, Background, background_of
+from estimator.compiled import V3, compiled
+from estimator.contact import Miss
+from estimator.nuisances import Nuisances, Owner, State, nuisance_states, nuisances_of
 from estimator.prior import AxisPrior
-from estimator.readings import NORMAL, POSITION, Readings
-from estimator.vectors import Array, Index, basis_across
-
-MISS_SOFTNESS = 5e-3  # how sharply the believed radius may be taken where a finger met nothing [m]
+from estimator.readings import Readings
+from estimator.vectors import Array, Index
 
 
-class Nuisances(NamedTuple):
-    """Which nuisance states there are, shared by all sets.
+class Problems(NamedTuple):
+    """S sets of contacts with the same nuisance states, and what is believed of their lines."""
 
-    Args:
-        slots: For each contact the state index of delta, lambda and the first of its bias,
-            counted from zero; -1 where switched off, (n, 3).
-        precision: Of each state about zero, (N,).
-    """
+    readings: Readings
+    nuisances: Nuisances
+    background: Background
 
+
+class Problem(NamedTuple):
+    """One of them: its contacts (n, columns), its line's row, and what all sets share."""
+
+    contacts: Array
+    line: Array
     slots: Index
     precision: Array
-
-
-class Owner(NamedTuple):
-    """Whose a contact is: what its nuisance states hang on."""
-
-    noise: SensorNoise
-    finger: str = ""
-    sensor: str = ""
-
-
-State = tuple[str, str, int, int]  # name, owner, first index, width
-
-
-ORIGIN, SPREAD, POINT, BASIS, PRECISION, SIZE = 0, 3, 4, 7, 16, 32  # columns of a line's row
-
-
-class Background(NamedTuple):
-    """What is believed of each set's line.
-
-    Args:
-        lines: Origin of the charts [m], length scale [m], and the prior's point, chart basis (e1,
-            e2, direction), precision (4, 4), mean radius [m] and weight 1 / (sd^2 n), one row a
-            set or one shared by all, (S or 1, 34).
-        informed: Whether there is a prior.
-        misses: Tip [m], distance the axis keeps at least [m], softness [m], (M, 5).
-        slope: Sd of sin(slope of the profile) [-], infinite where nothing is assumed of it.
-        gross: Probability that a contact is grossly wrong, zero for never.
-    """
-
-    lines: Array
     informed: bool
     misses: Array
     slope: float
     gross: float
 
 
-def nuisance_states(contacts: Sequence[Owner], assumptions: Assumptions) -> tuple[State, ...]:
-    """Every state that some contact's noise asks for, with a standard deviation above zero."""
-    states: list[State] = []
-    first = 0
-    for name, width in (("direction_offset", 1), ("scale_offset", 1), ("position_bias", 3)):
-        if not getattr(assumptions, name):
-            continue
-        for owner in dict.fromkeys(_owner(c, name) for c in contacts):
-            if _largest(contacts, name, owner) > 0.0:
-                states.append((name, owner, first, width))
-                first += width
-    return tuple(states)
-
-
-def nuisances_of(contacts: Sequence[Owner], states: Sequence[State]) -> Nuisances:
-    """The states as numbers: where each contact finds its own, and their precision."""
-    columns = {"direction_offset": 0, "scale_offset": 1, "position_bias": 2}
-    slots = np.full((len(contacts), 3), -1, dtype=np.intp)
-    precision: list[float] = []
-    for name, owner, first, width in states:
-        precision += [1.0 / _largest(contacts, name, owner) ** 2] * width
-        for i, contact in enumerate(contacts):
-            if _owner(contact, name) == owner:
-                slots[i, columns[name]] = first
-    return Nuisances(slots, np.array(precision, dtype=np.float64))
-
-
-def _owner(contact: Owner, name: str) -> str:
-    return contact.finger if name == "position_bias" else contact.sensor
-
-
-def _largest(contacts: Sequence[Owner], name: str, owner: str) -> float:
-    return max(float(getattr(c.noise, name)) for c in contacts if _owner(c, name) == owner)
-
-
-def background_of(
-    readings: Readings,
-    priors: Sequence[AxisPrior],
-    misses: Sequence[Miss],
-    *,
-    slope: float,
-    gross: float,
-) -> Background:
-    """What is believed, as numbers; `priors` has none, one for all sets, or one for each."""
-    if not priors:
-        return Background(_uninformed(readings), False, np.zeros((0, 5)), slope, gross)
-    lines = np.array([_informed(prior, max(readings.shape[1], 1)) for prior in priors])
-    return Background(lines, True, _missed(misses, priors[0]), slope, gross)
-
-
-def _informed(prior: AxisPrior, n: int) -> Array:
-    axis = prior.axis
-    return np.concatenate(
-        [
-            axis.point,
-            [prior.radius],
-            axis.point,
-            basis_across(axis.direction).ravel(),
-            axis.direction,
-            np.linalg.inv(prior.covariance).ravel(),
-            [prior.radius, 1.0 / (prior.radius_sd**2 * n)],
-        ]
+@compiled
+def problem_at(problems: Problems, s: int) -> Problem:
+    """Problem of set s."""
+    background, nuisances = problems.background, problems.nuisances
+    return Problem(
+        problems.readings[s],
+        background.lines[min(s, len(background.lines) - 1)],
+        nuisances.slots,
+        nuisances.precision,
+        background.informed,
+        background.misses,
+        background.slope,
+        background.gross,
     )
 
 
-def _uninformed(readings: Readings) -> Array:
-    p = readings[..., POSITION:NORMAL]
-    centroid = p.mean(axis=1)
-    lines = np.zeros((len(p), SIZE + 2))
-    lines[:, ORIGIN:SPREAD] = centroid
-    square = np.mean(np.sum((p - centroid[:, None]) ** 2, axis=-1), axis=1)
-    lines[:, SPREAD] = np.maximum(np.sqrt(square), 1e-300)
-    return lines
+@compiled
+def trusting(problem: Problem) -> Problem:
+    """The same without gross errors."""
+    return Problem(
+        problem.contacts,
+        problem.line,
+        problem.slots,
+        problem.precision,
+        problem.informed,
+        problem.misses,
+        problem.slope,
+        0.0,
+    )
 
 
-def _missed(misses: Sequence[Miss], prior: AxisPrior) -> Array:
-    sd = float(np.hypot(prior.radius_sd, MISS_SOFTNESS))
-    rows = [[*miss.tip, prior.radius + miss.radius, sd] for miss in misses]
-    return np.array(rows, dtype=np.float64).reshape(len(rows), 5)
+@compiled
+def spread_of(problem: Problem) -> float:
+    spread: float = problem.line[SPREAD]
+    return spread
+
+
+@compiled
+def states_of(problem: Problem, i: int, x: Array) -> tuple[float, float, V3]:
+    """delta, lambda and position bias of contact i."""
+    delta, scale, bias = 0.0, 0.0, (0.0, 0.0, 0.0)
+    slot = problem.slots[i]
+    if slot[0] >= 0:
+        delta = x[6 + slot[0]]
+    if slot[1] >= 0:
+        scale = x[6 + slot[1]]
+    if slot[2] >= 0:
+        k = 6 + slot[2]
+        bias = (x[k], x[k + 1], x[k + 2])
+    return delta, scale, bias
+
+
+@compiled
+def place(problem: Problem, i: int, j: int) -> int:
+    """Parameter of the whole problem that is parameter j of contact i; -1 for none."""
+    if j < 4:
+        return j
+    slot = problem.slots[i, min(j - 4, 2)]
+    if slot < 0:
+        return -1
+    first: int = slot
+    return 4 + first + max(j - 6, 0)
+
+
+def pose_problems(
+    readings: Readings,
+    owners: Sequence[Owner],
+    *,
+    priors: Sequence[AxisPrior] = (),
+    misses: Sequence[Miss] = (),
+    assumptions: Assumptions,
+) -> tuple[Problems, tuple[State, ...]]:
+    """The problems of S sets, and the nuisance states they share.
+
+    Args:
+        owners: Of the j-th contact of every set.
+        priors: None, one for all sets, or one for each.
+    """
+    states = nuisance_states(owners, assumptions)
+    gross = assumptions.gross(readings.shape[1])
+    background = background_of(
+        readings, priors, misses, slope=assumptions.sine_of_slope, gross=gross
+    )
+    return Problems(readings, nuisances_of(owners, states), background), states

@@ -11,7 +11,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.ndimage import spline_filter
 
-from estimator.response import CUBIC, KINDS, LINEAR, NEAREST, POINT_LOAD, SEPARABLE, ResponseModel
+from estimator.response import (
+    CUBIC,
+    HEADER,
+    KINDS,
+    LINEAR,
+    NEAREST,
+    POINT_LOAD,
+    SEPARABLE,
+    ResponseModel,
+)
 from estimator.vectors import Array
 
 SEPARABLE_FIELDS = ("amplitude", "d_x", "v_x", "d_y", "v_y", "phi_x", "phi_y", "skew")
@@ -186,3 +195,34 @@ def tangential(normal: ResponseModel, points: ArrayLike, direction: ArrayLike) -
     e = np.broadcast_to(np.asarray(direction, dtype=np.float64), loads.shape)
     ahead = -np.sum(delta * e[:, None], axis=-1) / np.sqrt(normal.rows[:, 3])
     return np.asarray(ahead * normal(loads))
+
+
+def altered(
+    model: ResponseModel,
+    *,
+    gain: ArrayLike = 1.0,
+    depth: float = 1.0,
+    positions: ArrayLike | None = None,
+) -> ResponseModel:
+    """The same tactels with other gains, in a layer `depth` times as thick, or elsewhere.
+
+    In a thicker layer every response is wider and lower: h'(r) = h(r / s) / s^2.
+
+    Args:
+        gain: Factor of each tactel, or one for all.
+        depth: s, common to all.
+        positions: New ones [m], (T, 2).
+    """
+    rows, s = np.array(model.rows), float(depth)
+    factor = np.broadcast_to(np.asarray(gain, dtype=np.float64), len(rows))
+    if model.kind == POINT_LOAD:
+        rows *= np.array([s, s**2, 1.0, s**2])
+        rows[:, 0] *= factor
+    elif model.kind == SEPARABLE:
+        rows[:, :6] *= np.array([s**-2, s**2, 1.0, s**2, 1.0, 1.0 / s])
+        rows[:, 0] *= factor
+    else:
+        rows[:, :4] *= np.array([s, s, 1.0 / s, 1.0 / s])
+        rows[:, HEADER:] *= factor[:, None] / s**2
+    places = model.positions if positions is None else np.asarray(positions, dtype=np.float64)
+    return ResponseModel(model.kind, rows, places)

@@ -9,11 +9,10 @@ from math import sqrt
 
 import numpy as np
 
-from estimator.compiled import V3, across, along, compiled, cross3, dot, scaled
-from estimator.likelihood import vector
+from estimator.background import BASIS, ORIGIN
+from estimator.compiled import V3, across, along, compiled, cross3, dot, scaled, vector
 from estimator.linear import factor, solve_factored
-from estimator.posterior import shared, spread_of
-from estimator.problem import BASIS, ORIGIN, POINT, Background
+from estimator.problem import Problem, spread_of
 from estimator.readings import K0, K1, NORMAL, POSITION, VOID, Readings
 from estimator.vectors import Array, cross
 
@@ -30,32 +29,28 @@ def most_seeds(n: int) -> int:
 
 
 @compiled
-def seed_lines(
-    readings: Readings, background: Background, extra: Array, s: int, seeds: Array
-) -> int:
-    """Fill seeds (M, 6) with points and unit directions; returns how many.
+def seed_lines(problem: Problem, extra: Array, seeds: Array) -> int:
+    """Fill seeds (M, 6) with points and unit directions, `extra` (E, 6) among them; how many.
 
     Two meridian planes meet in the axis, eq. (31): every pair of contacts under its four
     labellings. The rest starts where planes are parallel or directions void.
     """
-    count = _pair_lines(readings, background, s, seeds)
-    if background.informed:
-        row = background.lines[shared(background, s)]
-        _put(seeds, count, vector(row, POINT), vector(row, BASIS + 6))
+    count = _pair_lines(problem, seeds)
+    if problem.informed:
+        _write(seeds[count], vector(problem.line, ORIGIN), vector(problem.line, BASIS + 6))
         count += 1
-    n = readings.shape[1]
-    if n == 0:
+    if len(problem.contacts) == 0:
         return count
-    for k in range(extra.shape[1]):
-        _put(seeds, count, vector(extra[s, k], 0), vector(extra[s, k], 3))
+    for k in range(len(extra)):
+        _write(seeds[count], vector(extra[k], 0), vector(extra[k], 3))
         count += 1
-    return _fan(readings, background, s, seeds, count)
+    return _fan(problem, seeds, count)
 
 
 @compiled
-def _pair_lines(readings: Readings, background: Background, s: int, seeds: Array) -> int:
-    n = readings.shape[1]
-    origin = vector(background.lines[shared(background, s)], ORIGIN)
+def _pair_lines(problem: Problem, seeds: Array) -> int:
+    contacts, origin = problem.contacts, vector(problem.line, ORIGIN)
+    n = len(contacts)
     total = n * (n - 1) // 2
     stride = max(1.0, (total - 1) / (MOST_PAIRS - 1))
     count, seen, wanted = 0, 0, 0.0
@@ -66,80 +61,66 @@ def _pair_lines(readings: Readings, background: Background, s: int, seeds: Array
             if not chosen:
                 continue
             wanted += stride
-            if readings[s, i, VOID] > 0.0 or readings[s, j, VOID] > 0.0:
+            if contacts[i, VOID] > 0.0 or contacts[j, VOID] > 0.0:
                 continue
-            for first in range(2):
-                for second in range(2):
-                    if _meet(readings, s, i, j, first, second, origin, seeds, count):
+            for first in (K0, K1):
+                for second in (K0, K1):
+                    if _meet(contacts[i], first, contacts[j], second, origin, seeds[count]):
                         count += 1
     return count
 
 
 @compiled
-def _meet(
-    readings: Readings,
-    s: int,
-    i: int,
-    j: int,
-    first: int,
-    second: int,
-    origin: V3,
-    seeds: Array,
-    count: int,
-) -> bool:
-    """Where plane (k_first of i) meets plane (k_second of j), nearest to the origin."""
-    N1 = vector(readings[s, i], K0) if first == 0 else vector(readings[s, i], K1)
-    N2 = vector(readings[s, j], K0) if second == 0 else vector(readings[s, j], K1)
+def _meet(one: Array, first: int, other: Array, second: int, origin: V3, seed: Array) -> bool:
+    """Where the plane across direction `first` of one contact meets that of the other, nearest to
+    the origin; false where the planes are nearly parallel."""
+    N1, N2 = vector(one, first), vector(other, second)
     u = cross3(N1, N2)
     square = dot(u, u)
     if square < NEARLY_PARALLEL**2:
         return False
-    d1 = dot(N1, along(vector(readings[s, i], POSITION), -1.0, origin))
-    d2 = dot(N2, along(vector(readings[s, j], POSITION), -1.0, origin))
+    d1 = dot(N1, along(vector(one, POSITION), -1.0, origin))
+    d2 = dot(N2, along(vector(other, POSITION), -1.0, origin))
     point = along(scaled(d1, cross3(N2, u)), d2, cross3(u, N1))
-    point = along(origin, 1.0 / square, point)
-    u = scaled(1.0 / sqrt(square), u)
-    _put(seeds, count, point, u)
+    _write(seed, along(origin, 1.0 / square, point), scaled(1.0 / sqrt(square), u))
     return True
 
 
 @compiled
-def _fan(readings: Readings, background: Background, s: int, seeds: Array, count: int) -> int:
+def _fan(problem: Problem, seeds: Array, count: int) -> int:
     """Through the point the normals pass nearest: measured directions, and normals' products."""
-    n = readings.shape[1]
-    point = _meeting_point(readings, background, s)
-    fan = min(n, FAN)
-    for i in range(fan):
+    contacts = problem.contacts
+    point = _meeting_point(problem)
+    for i in range(min(len(contacts), FAN)):
         for k in (K0, K1):
-            u = vector(readings[s, i], k)
-            _put(seeds, count, _point_beside(readings, s, u, point), u)
+            u = vector(contacts[i], k)
+            _write(seeds[count], _point_beside(contacts, u, point), u)
             count += 1
         for j in range(i):
-            u = cross3(vector(readings[s, i], NORMAL), vector(readings[s, j], NORMAL))
+            u = cross3(vector(contacts[i], NORMAL), vector(contacts[j], NORMAL))
             square = dot(u, u)
             if square > NEARLY_PARALLEL**2:
                 u = scaled(1.0 / sqrt(square), u)
-                _put(seeds, count, _point_beside(readings, s, u, point), u)
+                _write(seeds[count], _point_beside(contacts, u, point), u)
                 count += 1
     return count
 
 
 @compiled
-def _put(seeds: Array, k: int, point: V3, u: V3) -> None:
-    seeds[k, 0], seeds[k, 1], seeds[k, 2] = point
-    seeds[k, 3], seeds[k, 4], seeds[k, 5] = u
+def _write(seed: Array, point: V3, u: V3) -> None:
+    seed[0], seed[1], seed[2] = point
+    seed[3], seed[4], seed[5] = u
 
 
 @compiled
-def _point_beside(readings: Readings, s: int, u: V3, point: V3) -> V3:
+def _point_beside(contacts: Array, u: V3, point: V3) -> V3:
     """Where the line along u passes the normals' lines nearest; near `point` where they do not say.
 
     A normal's line meets the axis where (u x n) . (p - a) = 0: two unknowns across u.
     """
     E1, E2 = across(u)
     g11, g12, g22, h1, h2 = 1e-3, 0.0, 1e-3, 0.0, 0.0
-    for i in range(readings.shape[1]):
-        row = readings[s, i]
+    for row in contacts:
         m = cross3(u, vector(row, NORMAL))
         gap = dot(m, along(vector(row, POSITION), -1.0, point))
         m1, m2 = dot(m, E1), dot(m, E2)
@@ -150,17 +131,15 @@ def _point_beside(readings: Readings, s: int, u: V3, point: V3) -> V3:
 
 
 @compiled
-def _meeting_point(readings: Readings, background: Background, s: int) -> V3:
+def _meeting_point(problem: Problem) -> V3:
     """The point that the normals' lines pass nearest; where parallel, near the contacts."""
-    n = readings.shape[1]
-    origin = vector(background.lines[shared(background, s)], ORIGIN)
-    spread = spread_of(background, s)
+    contacts, origin = problem.contacts, vector(problem.line, ORIGIN)
     system, pulled = np.zeros((3, 3)), np.zeros(3)
     for j in range(3):
-        system[j, j] = n + 1e-3  # the pull keeps the point near the contacts
-    for i in range(n):
-        normal = vector(readings[s, i], NORMAL)
-        gap = along(vector(readings[s, i], POSITION), -1.0, origin)
+        system[j, j] = len(contacts) + 1e-3  # the pull keeps the point near the contacts
+    for row in contacts:
+        normal = vector(row, NORMAL)
+        gap = along(vector(row, POSITION), -1.0, origin)
         side = along(gap, -dot(normal, gap), normal)
         for j in range(3):
             pulled[j] += side[j]
@@ -170,7 +149,7 @@ def _meeting_point(readings: Readings, background: Background, s: int) -> V3:
     solve_factored(system, pulled)
     point = (pulled[0], pulled[1], pulled[2])
     length = sqrt(dot(point, point))
-    return along(origin, min(1.0, 2.0 * spread / max(length, 1e-300)), point)
+    return along(origin, min(1.0, 2.0 * spread_of(problem) / max(length, 1e-300)), point)
 
 
 def complex_lines(readings: Readings) -> Array:

@@ -14,13 +14,14 @@ from dataclasses import fields, replace
 
 import numpy as np
 
-from estimator.assumptions import Assumptions
+from estimator.assumptions import Assumptions, Roughness
 from estimator.axis import Axis
 from estimator.contact import Contact
 from estimator.estimate import Hypothesis, TellingContact
 from estimator.modes import Modes, find_modes
+from estimator.nuisances import Owner
 from estimator.prior import AxisPrior
-from estimator.problem import Owner, background_of, nuisance_states, nuisances_of
+from estimator.problem import pose_problems
 from estimator.readings import Readings, exact_readings, readings_of
 from estimator.smooth import surface_through
 from estimator.surface import Geometry
@@ -122,17 +123,13 @@ def _after(
     assumptions: Assumptions,
 ) -> tuple[Array, Array]:
     """Were axis `right` right: its log odds after touching each place, and what that is worth."""
-    readings = _with_one_more(contacts, surface_through(axes[right], contacts, places.p))
-    owners = [Owner(c.noise, c.finger, c.sensor) for c in (*contacts, contacts[-1])]
-    background = background_of(
-        readings,
-        [] if prior is None else [prior],
-        (),
-        slope=assumptions.sine_of_slope,
-        gross=assumptions.gross(len(owners)),
+    readings = _with_one_more(
+        contacts, surface_through(axes[right], contacts, places.p), assumptions.rough
     )
-    states = nuisance_states(owners, assumptions)
-    modes = find_modes(readings, nuisances_of(owners, states), background)
+    owners = [Owner(c.noise, c.finger, c.sensor) for c in (*contacts, contacts[-1])]
+    priors = [] if prior is None else [prior]
+    problems, _ = pose_problems(readings, owners, priors=priors, assumptions=assumptions)
+    modes = find_modes(problems)
     p = np.array([c.position for c in contacts])
     findings = judge(readings, modes, np.full(len(readings), _spread(p)))
     P = np.sum(modes.probability * (_nearest(modes, axes, p) == right), axis=1)
@@ -144,13 +141,15 @@ def _after(
     return log_odds, worth - PLAIN * (findings.verdict == UNDETERMINED)
 
 
-def _with_one_more(contacts: Sequence[Contact], felt: Geometry) -> Readings:
+def _with_one_more(contacts: Sequence[Contact], felt: Geometry, rough: Roughness) -> Readings:
     """The contacts with one of G places added, (G, n + 1, columns)."""
     noise = contacts[-1].noise
     k0, k1 = (np.where(np.abs(k) < noise.flat, np.nan, k) for k in (felt.kappa_theta, felt.kappa_z))
     felt = _mapped(replace(felt, kappa_theta=k0, kappa_z=k1), np.s_[:, None])
     last = exact_readings(felt, noise)
-    return np.concatenate([np.repeat(readings_of(contacts), len(last), axis=0), last], axis=1)
+    return np.concatenate(
+        [np.repeat(readings_of(contacts, rough), len(last), axis=0), last], axis=1
+    )
 
 
 def _nearest(modes: Modes, axes: Sequence[Axis], p: Array) -> Index:

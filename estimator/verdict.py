@@ -15,8 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import chdtrc
 
-from estimator.compiled import V3, along, compiled, dot, scaled
-from estimator.likelihood import vector
+from estimator.compiled import V3, along, compiled, dot, scaled, vector
 from estimator.modes import Modes
 from estimator.readings import (
     EDGE,

@@ -15,8 +15,9 @@ from scipy.stats import chi2
 
 from estimator.axis import chart_lines
 from estimator.contact import SensorNoise
-from estimator.likelihood import fit_of, seen_from
-from estimator.readings import Readings, exact_readings
+from estimator.likelihood import fit_of
+from estimator.readings import ERRORS, Readings, exact_readings
+from estimator.sight import seen_from
 from estimator.vectors import Array
 
 STEP = 1e-6  # of the differences [m, rad]
@@ -76,8 +77,9 @@ def _shape(row: Readings, point: Array, direction: Array, finger: Array, bias: f
 def _residuals(row: Readings, point: Array, direction: Array, shift: Array) -> Array:
     """Whitened residuals of all contacts of a set about a line, (3 n,)."""
     a, u = tuple(point.tolist()), tuple(direction.tolist())
+    lean = np.empty((3, ERRORS))
     fits = [
-        fit_of(contact, seen_from(contact, a, u, tuple(off.tolist()), 0.0), 0.0)
+        fit_of(contact, seen_from(contact, a, u, tuple(off.tolist()), 0.0), 0.0, lean)
         for contact, off in zip(row, shift, strict=True)
     ]
     return np.array([[f.a, f.b, f.c] for f in fits]).ravel()

@@ -19,6 +19,7 @@ import numpy as np
 from scenarios import Scenes
 from scipy.stats import chi2
 
+from estimator.assumptions import SMOOTH, Roughness
 from estimator.batches import AxisEstimates, ContactSets
 from estimator.contact import SensorNoise
 from estimator.estimate import VERDICTS
@@ -83,8 +84,10 @@ def joined(runs: list[Runs]) -> Runs:
     return Runs(**{name: np.concatenate([vars(r)[name] for r in runs]) for name in vars(runs[0])})
 
 
-def judged(sets: ContactSets, scenes: Scenes, estimates: AxisEstimates) -> Runs:
-    """Estimates against the truth."""
+def judged(
+    sets: ContactSets, scenes: Scenes, estimates: AxisEstimates, rough: Roughness = SMOOTH
+) -> Runs:
+    """Estimates against the truth; `rough` is what the estimator was told of the surface."""
     error = charted(estimates.points, estimates.directions, scenes.points, scenes.directions)
     solved = np.linalg.solve(estimates.covariances, error[..., None])[..., 0]
     rows = true_rows(sets, scenes)
@@ -95,7 +98,7 @@ def judged(sets: ContactSets, scenes: Scenes, estimates: AxisEstimates) -> Runs:
         verdict=estimates.verdicts,
         p_value=estimates.p_values,
         stated=estimates.label_probabilities,
-        labelled=labelled(sets),
+        labelled=labelled(sets, rough),
         right=np.all((estimates.parallel_rows < 0.5) == (rows == 1), axis=1),
     )
 
@@ -122,9 +125,9 @@ def true_rows(sets: ContactSets, scenes: Scenes) -> Index:
     return np.argmax(np.abs(along), axis=-1)
 
 
-def labelled(sets: ContactSets) -> Mask:
+def labelled(sets: ContactSets, rough: Roughness) -> Mask:
     """Whether every contact has directions to label: none is held umbilic, (B,)."""
-    return np.all(readings_of_sets(sets)[..., VOID] == 0.0, axis=1)
+    return np.all(readings_of_sets(sets, rough)[..., VOID] == 0.0, axis=1)
 
 
 def beyond(runs: Runs) -> Mask:

@@ -9,20 +9,22 @@ from typing import Literal
 INTRODUCTION = """# Berkemeier & Fearing 1989, reproduced
 
 *Determining the Axis of a Surface of Revolution Using Tactile Sensing*, UCB/ERL M89/117. Every
-table, and Figures 5, 8 and 13, computed by this project's code from the paper's definitions and
-its printed data, beside what is printed. Inches and degrees, as in the paper. Everything on this
-page is recomputed each time `scripts/reproduce_paper.py` runs."""
+table, and Figures 5, 8, 13, 14, 15 and 17, computed by this project's code from the paper's
+definitions and its printed data, beside what is printed. Inches and degrees, as in the paper, but
+for the strain finger. Everything on this page is recomputed each time `scripts/reproduce_paper.py`
+runs."""
 
 END = """## What is not here
 
-- Figures 14, 15 and 17 (sensitivity, elasticity and angle error of the strain sensor) need the
-  simulated strain sensor and come with it.
-- The curves and points of Figures 5, 8 and 13 as drawn: we have the paper's text, not its drawings.
-  The figures are regenerated from the equations and data they show and compared with what the
-  text says of them. The paper does not say for which radii Figures 5 and 8 are drawn.
+- The curves and points of the figures as drawn: we have the paper's text, not its drawings. The
+  figures are regenerated from the equations and data they show and compared with what the text says
+  of them. The paper does not say for which radii Figures 5 and 8 are drawn, nor for which force and
+  rubber Figures 14 and 15: what is inferred is said there.
 - Figures 1-4, 6, 7, 9-12 and 16 are sketches, views of the planes of Table 7, and photographs."""
 
-Verdict = Literal["reproduced", "reproduced, print corrected", "not reproduced"]
+Verdict = Literal[
+    "reproduced", "reproduced, print corrected", "reproduced, inputs inferred", "not reproduced"
+]
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,7 @@ def figure_5() -> Figure:
     rho = np.linspace(0.0, 3.0, 13)
     left.plot(rho, axis_point_error(rho * INCH, PAPER_ERRORS) / INCH, color=OURS, label="ours")
     left.plot(rho, printed_delta_5(rho), **_DOTS, label="eqs (64), (68) as printed")
-    _label(left, f"radius of curvature {RHO}, in", POSITION_ERROR, "Position")
+    label(left, f"radius of curvature {RHO}, in", POSITION_ERROR, "Position")
     L = np.linspace(0.3, 6.0, 400)
     for radius, style in ((0.5, ":"), (1.0, "-"), (2.0, "--")):
         phi = bound_from_magnitudes(radius * INCH, radius * INCH, L * INCH, PAPER_ERRORS).angle
@@ -50,7 +50,7 @@ def figure_5() -> Figure:
     right.set_ylim(0.0, 95.0)
     right.text(1.2, 90.5, "90 deg: no bound", fontsize=8, va="center")
     words = r"distance of the axis points $|a_{z2} - a_{z1}|$, in"
-    _label(right, words, ORIENTATION_ERROR, "Orientation", legend="center right")
+    label(right, words, ORIENTATION_ERROR, "Orientation", legend="center right")
     figure.tight_layout()
     return figure
 
@@ -69,13 +69,13 @@ def figure_8() -> Figure:
     words = f"least: {delta:.4f} in at {at_delta:.0f} deg"
     left.plot(at_delta, delta, "o", color=OURS, label=words)
     left.set_ylim(0.0, 0.3)
-    _label(left, SEPARATION, POSITION_ERROR, "Position, r = 1 in", legend="upper center")
+    label(left, SEPARATION, POSITION_ERROR, "Position, r = 1 in", legend="upper center")
     right.plot(D, bound.angle / _DEG, color=OURS, lw=2, label="ours: both corners")
     right.plot(D, printed_phi_8(D), "--", color=PRINT, label="eq. (72) as printed")
     words = f"least: {phi:.3f} deg at {at_phi:.0f} deg"
     right.plot(at_phi, phi, "o", color=OURS, label=words)
     right.set_ylim(0.0, 40.0)
-    _label(right, SEPARATION, ORIENTATION_ERROR, "Orientation", legend="upper center")
+    label(right, SEPARATION, ORIENTATION_ERROR, "Orientation", legend="upper center")
     for axes in (left, right):
         axes.set_xlim(0.0, 180.0)
         axes.set_xticks(range(0, 181, 30))
@@ -100,13 +100,14 @@ def figure_13(panels: Sequence[tuple[str, Accepted]]) -> Figure:
         axes.set_ylim(7e-4, 30.0)
         axes.set_xlim(-2.0, 92.0)
         axes.set_xticks(range(0, 91, 15))
-        _label(axes, "angle error, deg", "", title, legend="upper left")
+        label(axes, "angle error, deg", "", title, legend="upper left")
     grid[0].set_ylabel("position error, in")
     figure.tight_layout()
     return figure
 
 
-def _label(axes: Axes, x: str, y: str, title: str, *, legend: Corner = "best") -> None:
+def label(axes: Axes, x: str, y: str, title: str, *, legend: Corner = "best") -> None:
+    """Words, grid and legend of one panel."""
     axes.set_xlabel(x)
     axes.set_ylabel(y)
     axes.set_title(title, fontsize=10)

@@ -2,9 +2,10 @@
 
 Tables 1-6 are theory: contacts that satisfy each condition are constructed and their ranks
 computed. Figures 5 and 8 are error bounds. Tables 7, 8 and Figure 13 are the paper's experiments,
-recomputed from its printed vectors and done again with our estimator.
+recomputed from its printed vectors and done again with our estimator. Figures 14, 15 and 17 are its
+strain sensor, simulated and read.
 
-Writes paper.md, figure_5.png, figure_8.png and figure_13.png into --out. Exit status: 0, or 2 where
+Writes paper.md and figure_5, 8, 13, 14, 15 and 17.png into --out. Exit status: 0, or 2 where
 nothing can be written there.
 
 Example: python scripts/reproduce_paper.py --out out/paper
@@ -20,12 +21,15 @@ from pathlib import Path
 import numpy as np
 import paper_bounds
 import paper_plots
+import paper_sensor
+import paper_sensor_plots
 import tyro
 from matplotlib.figure import Figure
 from output_files import require_writable, write_whole
 from paper_experiment_errata import experiment_errata
 from paper_experiments import read_experiment
 from paper_figure_13 import TOLERANCES, figure_13
+from paper_figure_17 import figure_17, table_8_angles
 from paper_page import Section, page
 from paper_ranks import table_1
 from paper_results import table_7_results, table_8
@@ -76,6 +80,7 @@ def _reproduce() -> tuple[list[Section], str, dict[str, Figure]]:
     measured = {
         symbol: [c[symbol] for c in columns.values() if symbol in c] for symbol in columns["table8"]
     }
+    slopes = paper_sensor.cylinder_angles(np.random.default_rng(SEED))
     sections = [
         *(make(rng) for make in (table_1, table_2, table_3, table_4, table_5, table_6)),
         paper_bounds.table_7_notation(measured),
@@ -84,12 +89,18 @@ def _reproduce() -> tuple[list[Section], str, dict[str, Figure]]:
         table_7_results(first, columns["table7"]),
         table_8(second, columns["table8"]),
         figure_13(second, own, rng),
+        paper_sensor.figure_14(),
+        paper_sensor.figure_15(slopes),
+        figure_17(second, rng),
     ]
     panels = [(f"rank test, tolerance {t:g}", rank_test(second, t)) for t in TOLERANCES]
     figures = {
         "figure_5.png": paper_plots.figure_5(),
         "figure_8.png": paper_plots.figure_8(),
         "figure_13.png": paper_plots.figure_13([*panels, ("estimate_axis, all 120", own)]),
+        "figure_14.png": paper_sensor_plots.figure_14(),
+        "figure_15.png": paper_sensor_plots.figure_15(slopes),
+        "figure_17.png": paper_sensor_plots.figure_17(*table_8_angles(second)),
     }
     text = page(sections, [*theory_errata(), *experiment_errata(first, second)])
     return sections, text + "\n", figures

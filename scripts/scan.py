@@ -16,6 +16,7 @@ import numpy as np
 from scenarios import Scenes, posed
 from scipy.interpolate import RectBivariateSpline
 
+from estimator.assumptions import Roughness
 from estimator.profile import SplineProfile, spline_through
 from estimator.surface import Geometry
 from estimator.vectors import Array, cross, unit
@@ -126,12 +127,41 @@ def _principal(tangent: Array, slope: Array, hessian: Array) -> tuple[Array, Arr
     return kappa, np.swapaxes(vectors, -1, -2) @ whiten @ tangent
 
 
-def draw_touches(scan: Scan, count: int, contacts: int, *, rng: np.random.Generator) -> Scenes:
+def draw_touches(
+    scan: Scan,
+    count: int,
+    contacts: int,
+    *,
+    rng: np.random.Generator,
+    meridians: tuple[float, float] = (-np.pi, np.pi),
+) -> Scenes:
     """Random places, away from the rims, in random poses."""
     low, high = scan.profile.z_range
-    theta = rng.uniform(-np.pi, np.pi, (count, contacts))
+    theta = rng.uniform(*meridians, (count, contacts))
     z = rng.uniform(low + RIM, high - RIM, (count, contacts))
     return posed(felt(scan, theta, z), scan.radius(np.zeros(count), np.zeros(count)), rng=rng)
+
+
+def roughness(
+    scan: Scan, meridians: tuple[float, float], *, rng: np.random.Generator, count: int = 5000
+) -> Roughness:
+    """How far a part of the scan strays from its own profile, as a fingertip feels it.
+
+    The normal's tilt out of the meridian plane and the twist K_tz would vanish on a surface of
+    revolution; their root mean square is what dents and seams do. Worst one per cent left out:
+    that is for the gross errors of the estimator.
+    """
+    touched = draw_touches(scan, count, 1, rng=rng, meridians=meridians)
+    g, u = touched.geometry, touched.directions[:, None]
+    e = unit(cross(u, g.p - touched.points[:, None]))
+    c, s = np.sum(g.k_theta * e, axis=-1), np.sum(g.k_z * e, axis=-1)
+    twist = (g.kappa_theta - g.kappa_z) * c * s
+    return Roughness(_rms(np.sum(g.n * e, axis=-1)), _rms(twist))
+
+
+def _rms(values: Array) -> float:
+    kept = np.sort(np.abs(values.ravel()))[: int(0.99 * values.size)]
+    return float(np.sqrt(np.mean(kept**2)))
 
 
 def bare(scan: Scan) -> Scan:

@@ -7,11 +7,11 @@ from itertools import product
 
 import numpy as np
 from honesty import Runs, bootstrap, efficiency, joined, judged, proportion, wrong_shares
-from scan import PATCH, Scan, bare, draw_touches, load_scan
+from scan import PATCH, Scan, bare, draw_touches, load_scan, roughness
 from studies import against_bound
 from workload import Row, Table, Workload
 
-from estimator.assumptions import Assumptions
+from estimator.assumptions import SMOOTH, Assumptions, Roughness
 from estimator.estimate import VERDICTS
 from estimator.sensors import SENSORS
 from estimator.vectors import Array, cross, unit
@@ -19,19 +19,34 @@ from sim_sensor.batch_noise import read_sets
 from sim_sensor.noise import SimulatedSensor
 
 COUNTS = (3, 4, 5, 6, 8, 10)
+LEARNT, TOUCHED = (-np.pi, 0.0), (0.0, np.pi)  # meridians
 ARRAYS = ("error", "trusting", "bound")
 
 
 def scan_study(work: Workload) -> list[Table]:
-    """Determined and wrong on a real surface; what robustness costs on a clean one."""
+    """Determined and wrong on a real surface; what robustness costs on a clean one.
+
+    The estimator is told no roughness, or that of one half of the scan while it touches the other.
+    """
     assert work.objects is not None
     scan = load_scan(work.objects)
     cells = list(product(work.sensors, COUNTS))
-    part = work.share(2 * len(cells))
+    part = work.share(3 * len(cells))
+    rough = roughness(scan, LEARNT, rng=np.random.default_rng([work.seed, 9]))
     tables = [_felt_table(scan, work.seed)]
-    for title, surface in ((f"Touches of {scan.name}", scan), ("Its bare profile", bare(scan))):
+    told = (
+        f"told {np.rad2deg(rough.normal):.2f} deg and {rough.curvature:.2f} /m of roughness, "
+        "measured on the other half"
+    )
+    for title, surface, known in (
+        (f"Touches of one half of {scan.name}, {told}", scan, rough),
+        ("The same, told of no roughness", scan, SMOOTH),
+        ("Its bare profile", bare(scan), SMOOTH),
+    ):
         found = {
-            cell: _touched(part, surface, *cell, rng=np.random.default_rng([work.seed, 7, i]))
+            cell: _touched(
+                part, surface, *cell, known, rng=np.random.default_rng([work.seed, 7, i])
+            )
             for i, cell in enumerate(cells)
         }
         rows = [_row(*map(str, cell), found[cell]) for cell in cells]
@@ -60,19 +75,25 @@ def _pooled(parts: list[Touched]) -> Touched:
 
 
 def _touched(
-    work: Workload, scan: Scan, sensor: str, contacts: int, *, rng: np.random.Generator
+    work: Workload,
+    scan: Scan,
+    sensor: str,
+    contacts: int,
+    rough: Roughness,
+    *,
+    rng: np.random.Generator,
 ) -> Touched:
     parts = []
     for size in work:
-        scenes = draw_touches(scan, size, contacts, rng=rng)
+        scenes = draw_touches(scan, size, contacts, rng=rng, meridians=TOUCHED)
         sets = read_sets(
             SimulatedSensor(SENSORS[sensor], SENSORS[sensor]), scenes.geometry, rng=rng
         )
-        estimates = work.estimate(sets)
+        estimates = work.estimate(sets, assumptions=Assumptions(rough=rough))
         error, bound = against_bound(scenes, estimates, sets.noise)
-        plain = work.estimate(sets, assumptions=Assumptions(gross_error=0.0))
+        plain = work.estimate(sets, assumptions=Assumptions(gross_error=0.0, rough=rough))
         trusting, _ = against_bound(scenes, plain, sets.noise)
-        parts.append(Touched(judged(sets, scenes, estimates), error, trusting, bound))
+        parts.append(Touched(judged(sets, scenes, estimates, rough), error, trusting, bound))
         work.progress(size)
     return _pooled(parts)
 

@@ -9,13 +9,17 @@ import pytest
 
 from estimator.assumptions import Assumptions
 from estimator.axis import Axis, chart_coordinates, chart_lines
+from estimator.background import ORIGIN
+from estimator.chart import stepped
 from estimator.fusion import estimate_axis
-from estimator.posterior import cost_at, move, work_space
-from estimator.problem import Owner, background_of, nuisances_of
+from estimator.nuisances import Owner
+from estimator.posterior import cost_at
+from estimator.problem import pose_problems, problem_at
 from estimator.profile import cylinder
 from estimator.readings import K0, K1, POSITION, readings_of
 from estimator.surface import SurfaceOfRevolution
 from estimator.vectors import cross, unit
+from estimator.work import work_space
 from sim_sensor.noise import simulated_sensor
 
 SAMPLES, HEAVY = 2000, 4.0
@@ -45,12 +49,8 @@ def sampled_labels(touched, result, rng):
     """Probability of each labelling by importance sampling, and the effective sample size."""
     readings = readings_of(touched)
     owners = [Owner(c.noise) for c in touched]
-    problem = (
-        readings,
-        nuisances_of(owners, ()),
-        background_of(readings, [], (), slope=np.inf, gross=0.0),
-        0,
-    )
+    problem = problem_at(pose_problems(readings, owners, assumptions=Assumptions())[0], 0)
+    origin = tuple(problem.line[ORIGIN : ORIGIN + 3])
     work = work_space(4, len(touched))
     peaks = [(h.axis, np.linalg.cholesky(h.covariance)) for h in result.hypotheses]
     z = rng.normal(size=(len(peaks), SAMPLES, 4)) / np.sqrt(
@@ -65,8 +65,8 @@ def sampled_labels(touched, result, rng):
     costs = np.empty(len(p))
     for k in range(len(p)):
         x = np.concatenate([p[k], u[k]])
-        move(problem[2], 0, x.copy(), np.zeros(4), x)
-        costs[k] = cost_at(*problem, x, False, work)
+        stepped(x.copy(), np.zeros(4), origin, x)
+        costs[k] = cost_at(problem, x, False, work)
     weight = np.exp(costs.min() - costs) / proposal
     weight /= weight.sum()
     e = unit(cross(u[:, None], readings[..., POSITION : POSITION + 3] - p[:, None]))

@@ -13,14 +13,11 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
-
 import degenerate
 import fuzz
 import fuzz_inputs
+import numpy as np
+import pytest
 from bias_study import BIAS
 from honesty import (
     Runs,
@@ -96,16 +93,16 @@ def test_label_probabilities_are_true() -> None:
 
 
 def test_determined_is_hardly_ever_wrong() -> None:
-    """Promised in under 0.5 % of runs: of 1920 no more than 20 (four standard errors above)."""
+    """Promised in under 0.5 % of runs, measured in 0 to 0.1 %: of 1920 no more than 6."""
     runs = joined([slice_of(n) for n in (3, 4, 6, 10)])
-    assert beyond(runs).sum() <= 20
+    assert beyond(runs).sum() <= 6
     assert runs.determined.mean() > 0.8
 
 
 def test_true_surfaces_of_revolution_are_not_called_misfits() -> None:
     runs = joined([slice_of(n) for n in (3, 4, 6, 10)])
     assert np.mean(runs.p_value < 1e-4) < 0.005
-    assert np.mean(runs.p_value < 0.05) < 0.13
+    assert np.mean(runs.p_value < 0.05) < 0.08
 
 
 @pytest.mark.parametrize(
@@ -154,13 +151,13 @@ def degenerate_rows() -> tuple[list[Row], list[Row]]:
 
 def test_touches_that_leave_the_axis_open_are_called_undetermined_for_the_right_reason() -> None:
     for row in degenerate_rows()[0]:
-        assert row["undetermined"][0] >= 0.96, row  # of 75 runs
-        assert row["for a right reason"][0] >= 0.93, row
+        assert row["undetermined"][0] >= 0.98, row  # of 75 runs
+        assert row["for a right reason"][0] >= 0.95, row
 
 
 def test_well_placed_touches_are_not_called_undetermined() -> None:
     for row in degenerate_rows()[1]:
-        assert row["undetermined"][0] < 0.03, row
+        assert row["undetermined"][0] < 0.02, row
 
 
 def test_anything_a_contact_may_hold_gives_numbers_or_is_refused_at_the_door() -> None:

@@ -4,19 +4,13 @@ Clean contacts must give the true axis; noisy ones the errors that other impleme
 same methods have on the same noise (0.25 mm, 1 deg; barrel r = 25 - 0.006 z^2 mm, 240 deg of arc).
 """
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
-
 from benchmark_problems import OBJECTS
 from peers import cylinder_package, linear_complex
 from peers_labels import labelled_least_squares
 from peers_ransac import ransac_refined
+from scipy.spatial.transform import Rotation
 
 from estimator.axis import Axis, angle_between, offset_at
 from estimator.contact import Contact, SensorNoise

@@ -5,52 +5,25 @@ The truths: Pinocchio's kinematics, the vertices of the raw meshes against the a
 
 from __future__ import annotations
 
-import casadi as ca
-import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+from reach_targets import HALF, SHAPES, target
 
 import planner.reach
 from hand_models.collision import HandCollision
 from hand_models.geometry import link_points
-from hand_models.hand import HandError, load_hand
+from hand_models.hand import load_hand
 from hand_models.postures import posture_library
-from hand_models.spheres import link_spheres
 from planner.reach import Reach, ReachOptions, ReachSolver, Unreachable
 from planner.reach_model import ReachModel
-from planner.solid import PARAMETERS, RevolvedSolid, signed_distance
-from planner.starts import Start, StartSearch
+from planner.solid import RevolvedSolid
+from planner.starts import Start
 from planner.workspace import Workspace
 
 HAND = load_hand("allegro_right")
 SOLVER = ReachSolver(HAND)
 COLLISION = HandCollision(HAND)
-HALF = 0.09
-SHAPES = ("cylinder", "cone", "barrel", "bottle")
-
-
-def profile(shape, r):
-    z = np.linspace(-HALF, HALF, 60)
-    bottle = r - 0.012 / (1.0 + np.exp(-(z - 0.03) / 0.008))
-    return z, {"cylinder": r + 0 * z, "cone": r + 0.15 * z, "barrel": r - 3 * z**2}.get(
-        shape, bottle
-    )
-
-
-def target(rng, gaps, shape, r=None):
-    """Contacts at the gaps, heights within 20 mm, on a random object anywhere."""
-    z, radii = profile(shape, rng.uniform(0.025, 0.05) if r is None else r)
-    X_WO = pin.SE3(pin.exp3(rng.normal(size=3) * 2.0), rng.normal(size=3) * 0.1)
-    solid = RevolvedSolid(X_WO, z, radii)
-    theta = rng.uniform(0, 2 * np.pi) + np.concatenate([[0.0], np.cumsum(np.radians(gaps))])
-    heights = rng.uniform(-0.02, 0.02, len(theta))
-    rho, e = solid.radius(heights), 1e-6
-    slope = (solid.radius(heights + e) - solid.radius(heights - e)) / (2 * e)
-    p_O = np.stack([rho * np.cos(theta), rho * np.sin(theta), heights], axis=1)
-    n_O = np.stack([np.cos(theta), np.sin(theta), -slope], axis=1)
-    n_O /= np.linalg.norm(n_O, axis=1, keepdims=True)
-    return p_O @ X_WO.rotation.T + X_WO.translation, n_O @ X_WO.rotation.T, solid
 
 
 def vertices_outside(q, X_WB, solid, skip=()):
@@ -231,89 +204,3 @@ def test_a_new_object_needs_no_new_problem(monkeypatch):
         points, normals, solid = target(np.random.default_rng(seed), (), shape)
         solver.solve(points, normals, solid, fingers=["index"], motion="none")
     assert written == [((0,), "none")]
-
-
-def test_a_posture_is_found_again_from_its_own_contacts():
-    library = posture_library(HAND)
-    search = StartSearch(HAND, link_spheres(HAND))
-    X_WB = pin.SE3(pin.exp3(np.array([0.4, 1.0, -0.3])), np.array([0.2, 0.1, 0.0]))
-    far = RevolvedSolid(pin.SE3(np.eye(3), np.full(3, 5.0)), np.array([0.0, 0.1]), np.ones(2))
-    for k in range(5):
-        pose = HAND.at(library.q[k], X_WB)
-        order = [3, 0, 2]
-        (first, *_) = search.find(
-            pose.pad_centres[order],
-            -pose.pad_normals[order],
-            far,
-            fingers=tuple(order),
-            workspace=Workspace(),
-            table=None,
-            count=3,
-        )
-        np.testing.assert_array_equal(first.q, library.q[k])
-        np.testing.assert_allclose(first.X_WB.homogeneous, X_WB.homogeneous, atol=1e-9)
-        assert first.fingers == ("thumb", "index", "ring")
-
-
-@pytest.mark.parametrize("shape", SHAPES)
-def test_the_optimisers_distance_is_that_of_coal_beside_the_wall(shape):
-    """First order in the distance: within 3 % of it, plus half a millimetre."""
-    rng = np.random.default_rng(10)
-    *_, solid = target(rng, (), shape)
-    local = np.column_stack([rng.uniform(-0.09, 0.09, (400, 2)), rng.uniform(-0.07, 0.07, 400)])
-    rho = np.hypot(local[:, 0], local[:, 1])
-    local = local[np.abs(rho - solid.radius(local[:, 2]) - 0.006) < 0.005]
-    points = local @ solid.X_WO.rotation.T + solid.X_WO.translation
-    exact = []
-    for point in points:
-        at = coal.Transform3s(np.eye(3), point)
-        there = coal.Transform3s(solid.X_WO.rotation, solid.X_WO.translation)
-        one = [
-            coal.distance(
-                coal.Sphere(1e-6), at, part, there, coal.DistanceRequest(), coal.DistanceResult()
-            )
-            for part in solid.slices
-        ]
-        exact.append(min(one))
-    found = solid.distance(points)
-    np.testing.assert_allclose(found, exact, rtol=0.03, atol=6e-4)
-    x, p = ca.MX.sym("x", 3, len(points)), ca.MX.sym("p", PARAMETERS)
-    symbolic = ca.Function("d", [x, p], [signed_distance(x, p)])(points.T, solid.parameters)
-    np.testing.assert_allclose(np.array(symbolic).ravel(), found, atol=2e-6)
-
-
-@pytest.mark.parametrize(
-    ("points", "normals", "fingers", "error", "message"),
-    [
-        ([[0, 0, 0]], [[0, 0, 2]], None, ValueError, "unit vectors"),
-        ([[0, 0, np.nan]], [[0, 0, 1]], None, ValueError, "finite"),
-        (np.zeros((4, 3)), np.zeros((4, 3)), None, ValueError, "k 1 to 3"),
-        ([0, 0, 0], [0, 0, 1], None, ValueError, r"\(k, 3\)"),
-        ([[0, 0, 0]] * 2, [[0, 0, 1]] * 2, ["index"] * 2, ValueError, "2 different fingers"),
-        ([[0, 0, 0]], [[0, 0, 1]], ["little"], HandError, "its fingers are index"),
-    ],
-)
-def test_misuse_is_told(points, normals, fingers, error, message):
-    *_, solid = target(np.random.default_rng(0), (), "cylinder")
-    with pytest.raises(error, match=message):
-        SOLVER.solve(points, normals, solid, fingers=fingers)
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"cone": 0.0}, "cone"),
-        ({"least_standoff": 0.05}, "least_standoff"),
-        ({"starts": -1}, "starts"),
-    ],
-)
-def test_options_that_make_no_sense_are_refused(options, message):
-    with pytest.raises(ValueError, match=message):
-        ReachOptions(**options)
-
-
-def test_workspaces_that_make_no_sense_are_refused():
-    with pytest.raises(ValueError, match="position_range"):
-        Workspace(pin.SE3.Identity(), position_range=-0.1)
-    with pytest.raises(ValueError, match="rotation_range"):
-        Workspace(pin.SE3.Identity(), rotation_range=4.0)

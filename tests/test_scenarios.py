@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
-
-import numpy as np
-import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
 import fuzz_inputs
 import honesty
+import numpy as np
+import pytest
 import scan
 from detectability import powers
 from scenarios import FAMILIES, RADII, draw_scenes, draw_shapes

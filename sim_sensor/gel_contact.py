@@ -1,0 +1,146 @@
+"""How a gel lies on a body: its shape inside the contact ellipse, Hertz's free surface outside.
+
+Inside, the gel takes the body's true shape. Outside, the displacement of the half space under the
+Hertz pressure is exact (Johnson, Contact Mechanics, eq. 3.42),
+
+    u = 3F / (4 pi E*) (I - x^2 I_a - y^2 I_b),   I   = 2 R_F(s, a^2 + s, b^2 + s),
+    I_a = 2/3 R_D(s, b^2 + s, a^2 + s),           I_b = 2/3 R_D(s, a^2 + s, b^2 + s)
+
+with s the root of x^2/(a^2 + s) + y^2/(b^2 + s) = 1, tabulated for each touch over
+t = sqrt(s) / (sqrt(s) + sqrt(a b)). Two approximations: a finite thickness h damps it by
+exp(-distance / h), and a body that is no paraboloid scales it along each ray so that the gel meets
+the body at the rim of the ellipse. Lengths here in millimetres.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.special import elliprd, elliprf
+
+from estimator.compiled import compiled
+from estimator.depth_fit import dome
+from estimator.vectors import Array
+
+NODES = 33
+_LAST = 0.97  # of t
+
+
+def free_surface(a: Array, b: Array, delta: Array) -> Array:
+    """Tables of u / delta: value and slope over t of its three integrals, (B, NODES, 6)."""
+    t = np.linspace(0.0, _LAST, NODES)
+    c = np.sqrt(a * b)[:, None]
+    root = c * t / (1.0 - t)
+    droot = c / (1.0 - t) ** 2
+    s = root**2
+    A, B = a[:, None] ** 2 + s, b[:, None] ** 2 + s
+    common = -2.0 * droot / np.sqrt(A * B)
+    layers = [
+        2.0 * elliprf(s, A, B), common,
+        elliprd(s, B, A) / 1.5, common / A,
+        elliprd(s, A, B) / 1.5, common / B,
+    ]  # fmt: skip
+    whole = 2.0 * elliprf(0.0, a**2, b**2)
+    return np.asarray(np.stack(layers, axis=-1) / whole[:, None, None])
+
+
+@compiled
+def _hermite(f0: float, d0: float, f1: float, d1: float, t: float, h: float) -> float:
+    rise = f1 - f0
+    return f0 + t * (
+        h * d0 + t * (3.0 * rise - h * (2.0 * d0 + d1) + t * (h * (d0 + d1) - 2.0 * rise))
+    )
+
+
+@compiled
+def outside(x: float, y: float, a: float, b: float, table: Array) -> float:
+    """u / delta outside the ellipse, x along a."""
+    x2, y2, a2, b2 = x * x, y * y, a * a, b * b
+    half = 0.5 * (x2 + y2 - a2 - b2)
+    s = half + (half * half + x2 * b2 + y2 * a2 - a2 * b2) ** 0.5
+    root = max(s, 0.0) ** 0.5
+    h = _LAST / (NODES - 1)
+    t = min(root / (root + (a * b) ** 0.5), _LAST * 0.999999) / h
+    i = int(t)
+    t -= i
+    p, q = table[i], table[i + 1]
+    return (
+        _hermite(p[0], p[1], q[0], q[1], t, h)
+        - x2 * _hermite(p[2], p[3], q[2], q[3], t, h)
+        - y2 * _hermite(p[4], p[5], q[4], q[5], t, h)
+    )
+
+
+@compiled
+def height(x: float, y: float, c: Array) -> float:
+    """Polynomial of `gel_shape.POWERS`."""
+    second = c[0] * x * x + c[1] * x * y + c[2] * y * y
+    third = x * x * (c[3] * x + c[4] * y) + y * y * (c[5] * x + c[6] * y)
+    fourth = x * x * (c[7] * x * x + c[8] * x * y + c[9] * y * y)
+    return float(second + third + fourth + y * y * y * (c[10] * x + c[11] * y))
+
+
+@compiled
+def press_into(
+    out: Array,
+    pitch: float,
+    radius: float,
+    thickness: float,
+    ats: Array,
+    bodies: Array,
+    shapes: Array,
+    tables: Array,
+) -> None:
+    """Depth images of B touches.
+
+    Args:
+        out: (B, H, W) [mm].
+        pitch, radius, thickness: [mm]; the last two may be inf.
+        ats: Where on the undeformed pad the body's place comes to lie, x and y [mm], (B, 2).
+        bodies: Heights under the tangent plane in the pad's axes [mm], (B, 12).
+        shapes: cos, sin of a's direction, a, b, delta, and curvatures of the pressed paraboloid
+            along a and b, (B, 7).
+        tables: Of `free_surface`.
+    """
+    rows, columns = out.shape[1:]
+    flat = not np.isfinite(radius)
+    for n in range(out.shape[0]):
+        x0, y0 = ats[n]
+        c, s, a, b, delta, ka, kb = shapes[n]
+        body, table = bodies[n], tables[n]
+        z0 = dome(x0, y0, radius)
+        # axes of the tangent plane at the place, in the pad's: e1, e2, e3 outwards
+        e3x, e3y = (0.0, 0.0) if flat else (x0 / radius, y0 / radius)
+        e3z = (1.0 - e3x * e3x - e3y * e3y) ** 0.5
+        e1z = -e3x / (e3z * e3z + e3x * e3x) ** 0.5
+        e1x = (1.0 - e1z * e1z) ** 0.5
+        e2x, e2y, e2z = e3y * e1z, e3z * e1x - e3x * e1z, -e3y * e1x
+        for i in range(rows):
+            y = (i - 0.5 * (rows - 1)) * pitch
+            for j in range(columns):
+                x = (j - 0.5 * (columns - 1)) * pitch
+                pad = dome(x, y, radius)
+                dx, dy, dz = x - x0, y - y0, pad - z0
+                p, q = e1x * dx + e1z * dz, e2x * dx + e2y * dy + e2z * dz
+                u, v = c * p + s * q, c * q - s * p
+                far = (u / a) ** 2 + (v / b) ** 2
+                if far > 1.0:
+                    far = far**0.5
+                    rim_p, rim_q = p / far, q / far
+                    drop = height(rim_p, rim_q, body)
+                    if not flat:
+                        drop += 0.5 * (rim_p * rim_p + rim_q * rim_q) / radius
+                    meant = delta - 0.5 * (ka * u * u + kb * v * v) / (far * far)
+                    gap = (u * u + v * v) ** 0.5 * (1.0 - 1.0 / far)
+                    meet = max(delta - drop, 0.0) / max(meant, 1e-9)
+                    out[n, i, j] = (
+                        delta * outside(u, v, a, b, table) * meet * np.exp(-gap / thickness)
+                    )
+                elif flat:
+                    out[n, i, j] = max(delta - height(p, q, body), 0.0)
+                else:
+                    h = 0.0
+                    for _ in range(4):  # the body's surface under this pixel
+                        p, q = e1x * dx + e1z * dz, e2x * dx + e2y * dy + e2z * dz
+                        h = e3x * dx + e3y * dy + e3z * dz + delta - height(p, q, body)
+                        dz -= h / e3z
+                    out[n, i, j] = max(pad - z0 - dz, 0.0)
