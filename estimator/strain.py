@@ -46,7 +46,7 @@ from estimator.strain_flags import (
     umbilic,
     widened,
 )  # fmt: skip
-from estimator.strain_model import predicted_readings, reading_slopes
+from estimator.strain_model import DIGITS, predicted_readings, reading_slopes
 from estimator.strain_readings import StrainReadings
 from estimator.strain_solve import Curvatures, Solved, solve
 from estimator.strain_window import Windows, checked_frames, choose_windows
@@ -66,6 +66,7 @@ def read_strains(
     flat_prior: tuple[float, float] = FLAT_PRIOR,
     convex: bool = True,
     response: ResponseModel | None = None,
+    digits: float = DIGITS,
 ) -> StrainReadings:
     """The touch behind each frame of strains (or of taxel forces).
 
@@ -84,6 +85,7 @@ def read_strains(
             "one" how much of it may have been left out.
         convex: A second curvature below 0 is refitted as 0 and called saturated ("two" only).
         response: Measured impulse response of every tactel; by default the half space's.
+        digits: Of the quadrature, relative to the peak.
     Raises:
         ValueError: Wrong shape, infinite values, a frame that is all NaN, an unknown algorithm.
     """
@@ -101,7 +103,7 @@ def read_strains(
     raised = before_fit(windows, array)
     touched = ~nothing_to_fit(raised)
     model = response or array.response()
-    solved = solve(windows, touched, array, model, curvatures, flat_prior, convex)
+    solved = solve(windows, touched, array, model, curvatures, flat_prior, convex, digits)
     states = solved.states
     covariances = _covariances(solved, curvatures, flat_prior, array)
     if array.modulus_error > 0.0 or array.depth_error > 0.0:

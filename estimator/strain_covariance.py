@@ -79,7 +79,7 @@ def shared_errors(
     """What a wrong modulus and a wrong depth add to the covariance of the states.
 
     A modulus off by e makes E* K / F fit a K that is off by e K, *relative* K: on a finger that
-    turns the object's directions (sensor.md's first equation).
+    turns the object's directions (the slope 0.79 of Fig. 15).
 
     Args:
         depth_slopes: J'W times the readings' derivative over ln d, (B, 6).

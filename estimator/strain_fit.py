@@ -14,7 +14,7 @@ import numpy as np
 
 from estimator.compiled import compiled
 from estimator.hertz import curvature_into, ellipse_into
-from estimator.strain_model import DIGITS, MOST_NODES, ellipse_readings, over_curvature
+from estimator.strain_model import MOST_NODES, ellipse_readings, over_curvature
 from estimator.vectors import Array, Index
 
 MOST_STEPS = 60
@@ -30,7 +30,8 @@ class Problem(NamedTuple):
 
     `material` is E* [Pa], compliance, depth [m], the finger's curvature, and the flat curvature
     that the one-curvature algorithm assumes [1/m]; `prior` mean and 1/sd of the flat curvature
-    (1/sd = 0: none); `box` the least and largest x_0, y_0 (from the window's middle) and ln F.
+    (1/sd = 0: none); `box` the least and largest x_0, y_0 (from the window's middle) and ln F;
+    `digits` are those of the quadrature.
     """
 
     kind: int
@@ -39,6 +40,7 @@ class Problem(NamedTuple):
     material: tuple[float, float, float, float, float]
     prior: tuple[float, float]
     box: Array
+    digits: float
 
 
 class Room(NamedTuple):
@@ -114,7 +116,7 @@ def evaluate(
     """
     modulus, compliance, depth = problem.material[:3]
     A, g, J = room.A, room.g, room.J
-    digits = ROUGH_DIGITS if by_ellipse else DIGITS
+    digits = ROUGH_DIGITS if by_ellipse else problem.digits
     if by_ellipse:
         room.M[:] = state[3:6]
     else:
@@ -248,11 +250,10 @@ def descend(
             if better:
                 state[:], w[:], chi2, total = trial, w_trial, chi2_trial, total_trial
                 information[:], g[:] = room.A, room.g
+        least = ROUGH * (100.0 + total) if by_ellipse else CONVERGED * (1e-6 + total)
+        if fall < least or damping > 1e12:
+            return chi2, done + 1
         damping = max(0.1 * damping, 1e-12) if better else 8.0 * damping
-        if fall < (ROUGH * (100.0 + total) if by_ellipse else CONVERGED * (1e-6 + total)):
-            return chi2, done + 1
-        if damping > 1e12:
-            return chi2, done + 1
     return chi2, MOST_STEPS
 
 

@@ -64,8 +64,8 @@ def too_long(ellipses: Array, array: StrainArray) -> Mask:
     """The ellipse covers more than the window and most of a sense depth around it."""
     half = np.sqrt(np.einsum("bij,bij->bi", ellipses, ellipses))  # rows' lengths: half extents
     reach = (
-        0.5 * array.window[1] * array.axial_pitch + 0.8 * array.depth,
-        0.5 * array.window[0] * array.arc_pitch + 0.8 * array.depth,
+        0.5 * array.window[1] * array.axial_pitch + 0.7 * array.depth,
+        0.5 * array.window[0] * array.arc_pitch + 0.7 * array.depth,
     )
     return np.asarray(np.any(half > reach, axis=1))
 

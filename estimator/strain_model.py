@@ -224,13 +224,17 @@ def predicted_readings(
 
 
 def reading_slopes(
-    states: Array, array: StrainArray, response: ResponseModel | None = None
+    states: Array,
+    array: StrainArray,
+    response: ResponseModel | None = None,
+    *,
+    digits: float = DIGITS,
 ) -> Array:
     """Derivatives of all tactels over the state, (B, rows * columns, 6)."""
     model = response or array.response()
     J = np.empty((len(states), len(model), STATE))
     _all_readings(
         np.ascontiguousarray(states, dtype=np.float64), array.effective_modulus, array.compliance,
-        array.depth, DIGITS, model.kind, model.rows, model.positions, J,
+        array.depth, digits, model.kind, model.rows, model.positions, J,
     )  # fmt: skip
     return J

@@ -18,7 +18,7 @@ from estimator.vectors import Array, Index, Mask
 
 Curvatures = Literal["map", "two", "one"]
 OTHER_STARTS = 3
-CONTRADICTION = 3.0  # standard deviations between prior and strains
+CONTRADICTION = 3.5  # standard deviations between prior and strains
 FORCES = (-9.0, 7.0)  # ln F [N]
 
 
@@ -46,10 +46,11 @@ def solve(
     curvatures: Curvatures,
     flat_prior: tuple[float, float],
     convex: bool,
+    digits: float,
 ) -> Solved:
     """The best state of each window touched; see `strain.read_strains` for the algorithms."""
     prior = (flat_prior[0], 1.0 / flat_prior[1]) if curvatures == "map" else (0.0, 0.0)
-    problem = _problem(array, model, prior)
+    problem = _problem(array, model, prior, digits)
     B = len(touched)
     solved = Solved(
         np.tile([0.0, 0.0, -7.0, 1.0, 1.0 + array.curvature, 0.0], (B, 1)),
@@ -81,27 +82,35 @@ def _contradict(
     solved: Solved, touched: Mask, array: StrainArray, windows: Windows, weights: Array,
     problem: Problem,
 ) -> None:  # fmt: skip
-    """Once more without the prior where it and the strains are far apart.
+    """Once more without the prior, and kept if the sum of squares falls by more than 3.5^2.
 
-    Their difference over its own deviation, from what the prior left of it: with posterior
-    variance V and the prior's P it is (kappa_2 - mean) / sqrt(P - V).
+    That fall is the squared distance between prior and strains in standard deviations. Worth a
+    try only where the answer is far from the prior's mean by what the prior has left of it: with
+    posterior variance V and the prior's P the distance is about (kappa_2 - mean) / sqrt(P - V).
     """
     mean, rate = problem.prior
     covariances = inverse_information(solved.information)
     flat, sd = flat_curvatures(body_tensors(solved.states, array), covariances)
     learnt = np.maximum(1.0 / rate**2 - sd**2, 1e-9 / rate**2)
-    solved.off_prior[:] = touched & (np.abs(flat - mean) > CONTRADICTION * np.sqrt(learnt))
-    rows = np.flatnonzero(solved.off_prior)
+    far = touched & (np.abs(flat - mean) > 0.6 * CONTRADICTION * np.sqrt(learnt))
+    rows = np.flatnonzero(far)
+    solved.chi2[rows] += np.square(rate * (flat[rows] - mean)) - CONTRADICTION**2
+    before = solved.chi2[rows]
     free = problem._replace(prior=(0.0, 0.0))
-    _keep_better(solved, rows, solved.states[rows], windows, weights, free, False, always=True)
+    _keep_better(solved, rows, solved.states[rows], windows, weights, free, False)
+    solved.off_prior[rows] = solved.chi2[rows] < before
+    kept = rows[~solved.off_prior[rows]]
+    solved.chi2[kept] -= np.square(rate * (flat[kept] - mean)) - CONTRADICTION**2
 
 
-def _problem(array: StrainArray, model: ResponseModel, prior: tuple[float, float]) -> Problem:
+def _problem(
+    array: StrainArray, model: ResponseModel, prior: tuple[float, float], digits: float
+) -> Problem:
     reach_y, reach_x = (0.5 * (n + 1) for n in array.window)
     x, y = reach_x * array.axial_pitch, reach_y * array.arc_pitch
     material = (array.effective_modulus, array.compliance, array.depth, array.curvature, 0.0)
     box = np.array([(-x, x), (-y, y), FORCES])
-    return Problem(model.kind, model.rows, model.positions, material, prior, box)
+    return Problem(model.kind, model.rows, model.positions, material, prior, box, digits)
 
 
 def _keep_better(
