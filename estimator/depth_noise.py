@@ -131,47 +131,59 @@ def smooth_moment(
         pixels: Along a cell's side.
         length: l [mm].
     """
-    h, w = inside.shape
     G = max(1, round(0.35 * length / side))
-    hs, ws = (h + G - 1) // G, (w + G - 1) // G
-    S, row = np.zeros((hs, ws, TERMS)), np.empty(TERMS)
-    low_i, high_i, low_j, high_j = hs, 0, ws, 0
-    for i in range(h):
-        for j in range(w):
+    low_i, high_i, low_j, high_j = _box(inside, G)
+    rows, columns = high_i - low_i, high_j - low_j
+    S, row = np.zeros((columns, rows, TERMS)), np.empty(TERMS)
+    for i in range(low_i * G, min(high_i * G, inside.shape[0])):
+        for j in range(low_j * G, min(high_j * G, inside.shape[1])):
             if inside[i, j]:
-                si, sj = i // G, j // G
                 row_of(cells[X, i, j] - centre[0], cells[Y, i, j] - centre[1], row)
                 for k in range(TERMS):
-                    S[si, sj, k] += cells[COUNT, i, j] * row[k]
-                low_i, high_i = min(low_i, si), max(high_i, si + 1)
-                low_j, high_j = min(low_j, sj), max(high_j, sj + 1)
+                    S[j // G - low_j, i // G - low_i, k] += cells[COUNT, i, j] * row[k]
     pitch = side / pixels
     spread = length * length + pitch * pitch * ((G * pixels) ** 2 - 1.0) / 6.0
-    reach = min(int(4.0 * spread**0.5 / (G * side)) + 1, max(hs, ws))
-    kernel = np.empty(reach + 1)
-    for k in range(reach + 1):
-        kernel[k] = length / spread**0.5 * np.exp(-0.5 * (k * G * side) ** 2 / spread)
-    T = np.zeros((hs, ws, TERMS))
-    for i in range(low_i, high_i):
-        for j in range(low_j, high_j):
-            for m in range(max(low_j, j - reach), min(high_j, j + reach + 1)):
-                c = kernel[abs(m - j)]
-                for k in range(TERMS):
-                    T[i, j, k] += c * S[i, m, k]
+    scale, step = length / spread**0.5, 0.5 * (G * side) ** 2 / spread
+    T = np.dot(_kernel(columns, scale, step), S.reshape(columns, rows * TERMS))
+    swapped = np.empty((rows, columns, TERMS))
+    for i in range(rows):
+        for j in range(columns):
+            for k in range(TERMS):
+                swapped[i, j, k] = T[j, i * TERMS + k]
+    R = np.dot(_kernel(rows, scale, step), swapped.reshape(rows, columns * TERMS))
     B[:] = 0.0
-    for i in range(low_i, high_i):
-        for j in range(low_j, high_j):
-            row[:] = 0.0
-            for m in range(max(low_i, i - reach), min(high_i, i + reach + 1)):
-                c = kernel[abs(m - i)]
-                for k in range(TERMS):
-                    row[k] += c * T[m, j, k]
+    for i in range(rows):
+        for j in range(columns):
             for k in range(TERMS):
                 for n in range(k + 1):
-                    B[k, n] += S[i, j, k] * row[n]
+                    B[k, n] += S[j, i, k] * R[i, j * TERMS + n]
     for k in range(TERMS):
         for n in range(k):
             B[n, k] = B[k, n]
+
+
+@compiled
+def _box(inside: Mask, G: int) -> tuple[int, int, int, int]:
+    """Rows and columns of the domain, first and past the last, in blocks of G cells."""
+    low_i, high_i, low_j, high_j = inside.shape[0], 0, inside.shape[1], 0
+    for i in range(inside.shape[0]):
+        for j in range(inside.shape[1]):
+            if inside[i, j]:
+                low_i, high_i = min(low_i, i), max(high_i, i)
+                low_j, high_j = min(low_j, j), max(high_j, j)
+    return low_i // G, high_i // G + 1, low_j // G, high_j // G + 1
+
+
+@compiled
+def _kernel(n: int, scale: float, step: float) -> Array:
+    """Correlation along one axis of cells k apart, scale exp(-step k^2), as a matrix (n, n)."""
+    values, out = np.empty(n), np.empty((n, n))
+    for k in range(n):
+        values[k] = scale * np.exp(-step * k * k)
+    for i in range(n):
+        for j in range(n):
+            out[i, j] = values[abs(i - j)]
+    return out
 
 
 @compiled

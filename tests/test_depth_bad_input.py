@@ -93,7 +93,7 @@ def test_no_contact_is_told_and_has_no_surface(images):
 
 def test_a_batch_may_hold_touches_and_misses():
     readings = read_depth(
-        np.stack([pressed(K=((60.0, 0.0), (0.0, 20.0)), force=1.0), np.zeros((48, 64))]),
+        np.stack([pressed(K=((60.0, 0.0), (0.0, 25.0)), force=0.7), np.zeros((48, 64))]),
         PITCH,
         noise=NOISE,
     )
