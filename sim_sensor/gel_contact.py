@@ -7,9 +7,10 @@ Hertz pressure is exact (Johnson, Contact Mechanics, eq. 3.42),
     I_a = 2/3 R_D(s, b^2 + s, a^2 + s),           I_b = 2/3 R_D(s, a^2 + s, b^2 + s)
 
 with s the root of x^2/(a^2 + s) + y^2/(b^2 + s) = 1, tabulated for each touch over
-t = sqrt(s) / (sqrt(s) + sqrt(a b)). Two approximations: a finite thickness h damps it by
-(1 + distance / 8h)^-8, nearly an exponential, and a body that is no paraboloid scales it along each ray so that the gel meets
-the body at the rim of the ellipse. Lengths here in millimetres.
+t = sqrt(s) / (sqrt(s) + sqrt(a b)). Two approximations: a
+finite thickness h damps it by (1 + distance / 8h)^-8, nearly an exponential, and a body that is no
+paraboloid scales it along each ray so that the gel meets the body at the rim of the ellipse.
+Lengths here in millimetres.
 """
 
 from __future__ import annotations
@@ -105,6 +106,10 @@ def press_into(
         e2x, e2y, e2z = e3y * e1z, e3z * e1x - e3x * e1z, -e3y * e1x
         for i in range(rows):
             y = (i - 0.5 * (rows - 1)) * pitch
+            q = y - y0  # `height` along this row of a flat pad, a polynomial of p
+            h0 = q * q * (body[2] + q * (body[6] + q * body[11]))
+            h1 = q * (body[1] + q * (body[5] + q * body[10]))
+            h2, h3 = body[0] + q * (body[4] + q * body[9]), body[3] + q * body[8]
             for j in range(columns):
                 x = (j - 0.5 * (columns - 1)) * pitch
                 pad = dome(x, y, radius)
@@ -123,7 +128,8 @@ def press_into(
                     relaxed = delta * outside(u, v, a, b, root_ab, table)
                     out[n, i, j] = relaxed * max(delta - drop, 0.0) / (meant * damp * damp)
                 elif flat:
-                    out[n, i, j] = max(delta - height(p, q, body), 0.0)
+                    drop = h0 + p * (h1 + p * (h2 + p * (h3 + p * body[7])))
+                    out[n, i, j] = max(delta - drop, 0.0)
                 else:
                     h = 0.0
                     for _ in range(4):  # the body's surface under this pixel
