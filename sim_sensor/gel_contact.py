@@ -22,7 +22,7 @@ from estimator.compiled import compiled
 from estimator.depth_fit import dome
 from estimator.vectors import Array
 
-NODES = 25
+NODES = 21
 _LAST = 0.97  # of t
 
 

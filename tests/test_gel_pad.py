@@ -75,7 +75,7 @@ def test_far_from_the_contact_only_the_force_counts():
     table = free_surface(np.array([0.5]), np.array([0.3]), np.array([1.0]))[0]
     delta = float(indentation(0.5, 0.3, 1.0, 0.3))
     assert delta * outside(6.0, 5.0, 0.5, 0.3, np.sqrt(0.15), table) == pytest.approx(
-        1.0 / (np.pi * 0.3 * np.hypot(6.0, 5.0)), rel=5e-3
+        1.0 / (np.pi * 0.3 * np.hypot(6.0, 5.0)), rel=1e-2
     )
 
 
