@@ -6,6 +6,7 @@ import numpy as np
 
 from estimator.compiled import compiled
 from estimator.depth_cells import COUNT, MEAN, X, Y, deepest_cell, flood, other_blob, pool
+from estimator.depth_covariance import expected_square, noise_of_residuals, residuals, smooth_moment
 from estimator.depth_fit import (
     FEWEST_CELLS,
     ROUNDS,
@@ -16,7 +17,6 @@ from estimator.depth_fit import (
     fit_once,
     gather,
 )
-from estimator.depth_noise import expected_square, noise_of_residuals, residuals, smooth_moment
 from estimator.vectors import Array, Index, Mask
 
 FLAGS = (
