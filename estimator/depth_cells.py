@@ -55,7 +55,7 @@ def deepest_cell(cells: Array) -> tuple[int, int, float]:
     best, bi, bj = -np.inf, 0, 0
     for i in range(h):
         for j in range(w):
-            if not cells[COUNT, i, j] > 0.0:
+            if not (cells[COUNT, i, j] > 0.0 and cells[MEAN, i, j] > 0.5 * best):
                 continue
             total, n = 0.0, 0
             for k in range(max(i - 1, 0), min(i + 2, h)):
@@ -63,7 +63,7 @@ def deepest_cell(cells: Array) -> tuple[int, int, float]:
                     if cells[COUNT, k, m] > 0.0:
                         total += cells[MEAN, k, m]
                         n += 1
-            if total > best * n:
+            if total > best * n or best == -np.inf:
                 best, bi, bj = total / n, i, j
     return bi, bj, best
 
@@ -80,13 +80,14 @@ def flood(cells: Array, i: int, j: int, level: float, label: int, labels: Array)
         waiting -= 1
         ci, cj = stack[waiting, 0], stack[waiting, 1]
         size += 1
-        for ni in range(max(ci - 1, 0), min(ci + 2, h)):
-            for nj in range(max(cj - 1, 0), min(cj + 2, w)):
-                deep = cells[COUNT, ni, nj] > 0.0 and cells[MEAN, ni, nj] > level
-                if deep and labels[ni, nj] == 0:
-                    labels[ni, nj] = label
-                    stack[waiting, 0], stack[waiting, 1] = ni, nj
-                    waiting += 1
+        for k in range(4):
+            ni, nj = ci + (k == 0) - (k == 1), cj + (k == 2) - (k == 3)
+            if ni < 0 or nj < 0 or ni >= h or nj >= w or labels[ni, nj] != 0:
+                continue
+            if cells[MEAN, ni, nj] > level and cells[COUNT, ni, nj] > 0.0:
+                labels[ni, nj] = label
+                stack[waiting, 0], stack[waiting, 1] = ni, nj
+                waiting += 1
     return size
 
 

@@ -27,7 +27,7 @@ TERMS = 6  # c, g_x, g_y, H_xx, H_xy, H_yy
 FEWEST_CELLS = 12
 ACROSS, WITHIN = 0.85, 0.95
 _FLATTEST = 1.0 / 400.0  # of kappa_a / kappa_b, for the length of a line contact
-ROUNDS = 7
+ROUNDS = 6
 
 
 @compiled
@@ -214,19 +214,26 @@ def ellipse_of(terms: Array, radius: float, centre: Array, longest: float, ellip
 
 
 @compiled
-def domain(cells: Array, ellipse: Array, inside: Mask) -> int:
-    """Mark the cells well inside the ellipse, never less than 0.3 of its depth; their number."""
-    n = 0
+def domain(
+    cells: Array, ellipse: Array, radius: float, inside: Mask, points: Array, centre: Array
+) -> int:
+    """Mark and `gather` the cells well inside the ellipse, never less than 0.3 of its depth."""
+    inside[:] = False
+    x0, y0, c, s, a, b = ellipse[0], ellipse[1], ellipse[2], ellipse[3], ellipse[4], ellipse[5]
+    wide = WITHIN * np.hypot(a * c, b * s)
+    n, weight, sx, sy = 0, 0.0, 0.0, 0.0
     for i in range(inside.shape[0]):
         for j in range(inside.shape[1]):
-            x, y = cells[X, i, j] - ellipse[0], cells[Y, i, j] - ellipse[1]
-            u = (ellipse[2] * x + ellipse[3] * y) / ellipse[4]
-            v = (ellipse[2] * y - ellipse[3] * x) / ellipse[5]
-            inside[i, j] = (
-                abs(v) < ACROSS
-                and u * u + v * v < WITHIN * WITHIN
-                and cells[COUNT, i, j] > 0.0
-                and cells[MEAN, i, j] > 0.3 * ellipse[6]
-            )
-            n += inside[i, j]
+            x, y, w = cells[X, i, j], cells[Y, i, j], cells[COUNT, i, j]
+            if abs(x - x0) > wide or w == 0.0 or cells[MEAN, i, j] < 0.3 * ellipse[6]:
+                continue
+            u, v = (c * (x - x0) + s * (y - y0)) / a, (c * (y - y0) - s * (x - x0)) / b
+            if abs(v) < ACROSS and u * u + v * v < WITHIN * WITHIN:
+                inside[i, j] = True
+                points[0, n], points[1, n], points[3, n] = x, y, w
+                points[2, n] = dome(x, y, radius) - cells[MEAN, i, j]
+                sx, sy, weight = sx + w * x, sy + w * y, weight + w
+                n += 1
+    if n:
+        centre[0], centre[1] = sx / weight, sy / weight
     return n

@@ -1,14 +1,4 @@
-"""How a depth image errs, and what that does to a fit: white and correlated noise.
-
-Errors of reconstruction are smooth: autocorrelation exp(-r^2 / 2 l^2) with l of a millimetre or
-two (sensor.md, section 4). Ordinary least squares does not know; its covariance does,
-
-    cov = A^-1 (s_w^2 A + s_c^2 B) A^-1,    A = X'X,   B = X'RX,
-
-with R the correlation of all pairs of pixels in the domain. The rows X are summed in cells of
-about l / 3, and the correlation of means over cells of side q is again Gaussian to 2 %, with
-l'^2 = l^2 + q^2 / 6 and its height l^2 / l'^2: R is separable and costs a few thousand products.
-"""
+"""How a depth image errs: what a user states, and what frames without contact tell of it."""
 
 from __future__ import annotations
 
@@ -17,13 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimator.compiled import compiled
-from estimator.depth_cells import COUNT, MEAN, X, Y
-from estimator.depth_fit import TERMS, beyond_quadratic, dome, row_of
-from estimator.vectors import Array, Mask
-
-LENGTHS = np.array((0.0, 0.25, 0.4, 0.6, 0.9, 1.3, 2.0, 3.0))  # tried where none is told [mm]
-_UNSEEN = 2.0
-_LIKELY, _SPREAD = 1.3, 0.6  # of those: [mm], sd of the logarithm
+from estimator.vectors import Array
 
 
 @dataclass(frozen=True)
@@ -90,7 +74,7 @@ def noise_of_frames(frames: Array, pixel_pitch: float) -> tuple[float, float, fl
         rise = -np.expm1(-0.5 * (h / length) ** 2)
         rows = np.vstack([np.column_stack([np.full(len(h), 2.0), 2.0 * rise]), [1.0, 1.0]])
         seen = np.append(steps, variance)
-        white, smooth = _two_variances(rows / seen[:, None])
+        white, smooth = two_variances(rows / seen[:, None])
         misfit = float(np.sum((rows @ [white, smooth] / seen - 1.0) ** 2))
         if misfit < best[0]:
             best = (misfit, np.sqrt(white), np.sqrt(smooth), length)
@@ -98,7 +82,7 @@ def noise_of_frames(frames: Array, pixel_pitch: float) -> tuple[float, float, fl
 
 
 @compiled
-def _two_variances(rows: Array) -> tuple[float, float]:
+def two_variances(rows: Array) -> tuple[float, float]:
     """Non-negative (p, q) with rows (p, q)' nearest to ones."""
     aa = ab = bb = a = b = 0.0
     for i in range(rows.shape[0]):
@@ -117,170 +101,3 @@ def _two_variances(rows: Array) -> tuple[float, float]:
     alone_p = aa * p * p - 2.0 * a * p
     alone_q = bb * q * q - 2.0 * b * q
     return (p, 0.0) if alone_p <= alone_q else (0.0, q)
-
-
-@compiled
-def smooth_moment(
-    cells: Array, inside: Mask, centre: Array, side: float, pixels: int, length: float, B: Array
-) -> None:
-    """B = X'RX of unit correlated noise over the domain, (6, 6).
-
-    Args:
-        cells, inside, centre: As in `fit_once`.
-        side: Of a cell [mm].
-        pixels: Along a cell's side.
-        length: l [mm].
-    """
-    h, w = inside.shape
-    G = max(1, round(0.35 * length / side))
-    hs, ws = (h + G - 1) // G, (w + G - 1) // G
-    S, row = np.zeros((hs, ws, TERMS)), np.empty(TERMS)
-    low_i, high_i, low_j, high_j = hs, 0, ws, 0
-    for i in range(h):
-        for j in range(w):
-            if inside[i, j]:
-                si, sj = i // G, j // G
-                row_of(cells[X, i, j] - centre[0], cells[Y, i, j] - centre[1], row)
-                for k in range(TERMS):
-                    S[si, sj, k] += cells[COUNT, i, j] * row[k]
-                low_i, high_i = min(low_i, si), max(high_i, si + 1)
-                low_j, high_j = min(low_j, sj), max(high_j, sj + 1)
-    pitch = side / pixels
-    spread = length * length + pitch * pitch * ((G * pixels) ** 2 - 1.0) / 6.0
-    reach = min(int(4.0 * spread**0.5 / (G * side)) + 1, max(hs, ws))
-    kernel = np.empty(reach + 1)
-    for k in range(reach + 1):
-        kernel[k] = length / spread**0.5 * np.exp(-0.5 * (k * G * side) ** 2 / spread)
-    T = np.zeros((hs, ws, TERMS))
-    for i in range(low_i, high_i):
-        for j in range(low_j, high_j):
-            for m in range(max(low_j, j - reach), min(high_j, j + reach + 1)):
-                c = kernel[abs(m - j)]
-                for k in range(TERMS):
-                    T[i, j, k] += c * S[i, m, k]
-    B[:] = 0.0
-    for i in range(low_i, high_i):
-        for j in range(low_j, high_j):
-            row[:] = 0.0
-            for m in range(max(low_i, i - reach), min(high_i, i + reach + 1)):
-                c = kernel[abs(m - i)]
-                for k in range(TERMS):
-                    row[k] += c * T[m, j, k]
-            for k in range(TERMS):
-                for n in range(k + 1):
-                    B[k, n] += S[i, j, k] * row[n]
-    for k in range(TERMS):
-        for n in range(k):
-            B[n, k] = B[k, n]
-
-
-@compiled
-def residuals(
-    cells: Array, inside: Mask, radius: float, centre: Array, terms: Array, out: Array
-) -> float:
-    """Write each cell's misfit [mm] (zero outside); their mean square, pixels as weights."""
-    square, weight, row = 0.0, 0.0, np.empty(TERMS)
-    out[:] = 0.0
-    for i in range(inside.shape[0]):
-        for j in range(inside.shape[1]):
-            if inside[i, j]:
-                x, y = cells[X, i, j] - centre[0], cells[Y, i, j] - centre[1]
-                row_of(x, y, row)
-                r = dome(cells[X, i, j], cells[Y, i, j], radius) - cells[MEAN, i, j]
-                r -= beyond_quadratic(x, y, terms)
-                for k in range(TERMS):
-                    r -= row[k] * terms[k]
-                out[i, j] = r
-                square += cells[COUNT, i, j] * r * r
-                weight += cells[COUNT, i, j]
-    return square / weight
-
-
-@compiled
-def trace_product(A: Array, B: Array) -> float:
-    s = 0.0
-    for i in range(A.shape[0]):
-        for j in range(A.shape[1]):
-            s += A[i, j] * B[j, i]
-    return s
-
-
-@compiled
-def expected_square(
-    cells: Array, inside: Mask, inv: Array, B: Array, side: float, pixels: int, noise: Array
-) -> float:
-    """Mean square misfit [mm^2] that noise (white, correlated, length) leaves after the fit."""
-    weight, n = 0.0, 0
-    for i in range(inside.shape[0]):
-        for j in range(inside.shape[1]):
-            if inside[i, j]:
-                weight += cells[COUNT, i, j]
-                n += 1
-    pitch, length = side / pixels, max(noise[2], 1e-6)
-    flat = length**2 / (length**2 + pitch**2 * (pixels**2 - 1.0) / 6.0)
-    smooth = max(flat - trace_product(inv, B) / weight, 1e-3)
-    return float(noise[0] ** 2 * max(n - TERMS, 1) / weight + noise[1] ** 2 * smooth)
-
-
-@compiled
-def noise_of_residuals(
-    cells: Array,
-    inside: Mask,
-    centre: Array,
-    inv: Array,
-    side: float,
-    pixels: int,
-    misfit: Array,
-    noise: Array,
-) -> None:
-    """Estimate noise = (white, correlated, length) [mm] from one fit's residuals.
-
-    From their mean square, which the fit has diminished (by what `expected_square` says), and
-    their structure function at lags of one, two and four cells, which it hardly has. The length
-    has a log-normal prior: what varies more slowly than the domain is wide cannot be seen in it,
-    and for that the smooth variance is doubled.
-    """
-    seen, pairs = np.zeros(4), np.zeros(4)
-    h, w = inside.shape
-    for i in range(h):
-        for j in range(w):
-            if not inside[i, j]:
-                continue
-            seen[0] += misfit[i, j] ** 2
-            pairs[0] += 1.0
-            for k in range(3):
-                lag = 1 << k
-                if i + lag < h and inside[i + lag, j]:
-                    seen[k + 1] += (misfit[i, j] - misfit[i + lag, j]) ** 2
-                    pairs[k + 1] += 1.0
-                if j + lag < w and inside[i, j + lag]:
-                    seen[k + 1] += (misfit[i, j] - misfit[i, j + lag]) ** 2
-                    pairs[k + 1] += 1.0
-    n, pitch = pairs[0], side / pixels
-    seen = np.maximum(seen / np.maximum(pairs, 1.0), 1e-14)
-    B, rows, best = np.zeros((TERMS, TERMS)), np.zeros((4, 2)), np.inf
-    weight = n * pixels * pixels
-    for length in LENGTHS:
-        rows[:, 1] = 0.0
-        prior = 0.0
-        if length > 0.0:
-            smooth_moment(cells, inside, centre, side, pixels, length, B)
-            spread = length**2 + pitch**2 * (pixels**2 - 1.0) / 6.0
-            flat = length**2 / spread
-            rows[0, 1] = max(flat - trace_product(inv, B) / weight, 1e-3) / seen[0]
-            for k in range(3):
-                rise = 1.0 - np.exp(-0.5 * ((1 << k) * side) ** 2 / spread)
-                rows[k + 1, 1] = 2.0 * flat * rise / seen[k + 1]
-            prior = (np.log(length / _LIKELY) / _SPREAD) ** 2
-        per_cell = 1.0 / (pixels * pixels)
-        rows[0, 0] = per_cell * max(n - TERMS, 1.0) / n / seen[0]
-        for k in range(3):
-            rows[k + 1, 0] = 2.0 * per_cell / seen[k + 1] if pairs[k + 1] > 0.0 else 0.0
-            rows[k + 1, 1] = rows[k + 1, 1] if pairs[k + 1] > 0.0 else 0.0
-        p, q = _two_variances(rows)
-        cost = 0.02 * prior
-        for k in range(4):
-            cost += (rows[k, 0] * p + rows[k, 1] * q - 1.0) ** 2 if pairs[k] > 0.0 else 0.0
-        if cost < best:
-            best = cost
-            noise[0], noise[1], noise[2] = p**0.5, (_UNSEEN * q) ** 0.5, length

@@ -14,8 +14,9 @@ from scipy.fft import dctn, idctn
 from estimator.compiled import compiled
 from estimator.depth import images_of, require_positive
 from estimator.depth_cells import COUNT, MEAN, X, Y, pool
+from estimator.depth_covariance import smooth_moment, trace_product
 from estimator.depth_fit import TERMS, dome, inverse
-from estimator.depth_noise import DepthNoise, smooth_moment, trace_product
+from estimator.depth_noise import DepthNoise
 from estimator.depth_reading import (
     BORDER,
     CELL,

@@ -6,6 +6,7 @@ import numpy as np
 
 from estimator.compiled import compiled
 from estimator.depth_cells import COUNT, MEAN, X, Y, deepest_cell, flood, other_blob, pool
+from estimator.depth_covariance import expected_square, noise_of_residuals, residuals, smooth_moment
 from estimator.depth_fit import (
     FEWEST_CELLS,
     ROUNDS,
@@ -16,7 +17,6 @@ from estimator.depth_fit import (
     fit_once,
     gather,
 )
-from estimator.depth_noise import expected_square, noise_of_residuals, residuals, smooth_moment
 from estimator.vectors import Array, Index, Mask
 
 FLAGS = (
@@ -44,9 +44,9 @@ def _is_clipped(same: int, blob: int, pixels: int) -> bool:
 
 @compiled
 def leaves_image(hertz: Array, half_width: float, half_height: float) -> bool:
-    """Whether the contact ellipse reaches beyond the image."""
+    """Whether the contact ellipse, a tenth larger, reaches beyond the image."""
     x, y, c, s, a, b = hertz[0], hertz[1], hertz[2], hertz[3], hertz[4], hertz[5]
-    wide, high = np.hypot(a * c, b * s), np.hypot(a * s, b * c)
+    wide, high = 1.1 * np.hypot(a * c, b * s), 1.1 * np.hypot(a * s, b * c)
     return bool(abs(x) + wide > half_width or abs(y) + high > half_height)
 
 
@@ -96,9 +96,8 @@ def fit_domain(
         if not ellipse_of(terms, radius, centre, longest, hertz):
             return HOLLOW
         x, y, before = centre[0], centre[1], n
-        domain(cells, hertz, inside)
-        n = gather(cells, inside, radius, points, centre)
-        if n == before and abs(x - centre[0]) + abs(y - centre[1]) < 1e-3:
+        n = domain(cells, hertz, radius, inside, points, centre)
+        if abs(n - before) <= 1 and abs(x - centre[0]) + abs(y - centre[1]) < 0.02:
             break
     if n < FEWEST_CELLS or not fit_once(points, n, centre, terms, inv):
         return SMALL

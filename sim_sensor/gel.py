@@ -19,6 +19,7 @@ from sim_sensor.gel_noise import depth_noise
 from sim_sensor.gel_shape import POWERS, ObjectPatches
 
 _DEG = float(np.pi / 180.0)
+_CHUNK = 32  # images
 _MM = 1e3 ** np.array([1.0 - i - k for i, k in POWERS])  # coefficients to millimetres
 _MIRROR = np.array([(-1.0) ** k for _, k in POWERS])  # the body's y is the pad's -y
 
@@ -173,14 +174,16 @@ class GelSession:
     def image(self, true_mm: Array, *, rng: np.random.Generator) -> Array:
         """What the sensor reports of true depths [mm], in metres; consumes its argument."""
         pad = self.pad
-        noise = depth_noise(
-            true_mm.shape, pad.pitch,
-            white=pad.white, correlated=pad.correlated, length=pad.length, rng=rng,
-        )  # fmt: skip
-        true_mm *= self.gain * 1e-3
-        true_mm += noise
-        true_mm += self.offset
-        return np.minimum(true_mm, pad.deepest, out=true_mm)
+        for start in range(0, len(true_mm), _CHUNK):  # small enough to stay in the cache
+            part = true_mm[start : start + _CHUNK]
+            part *= self.gain * 1e-3
+            part += depth_noise(
+                part.shape, pad.pitch,
+                white=pad.white, correlated=pad.correlated, length=pad.length, rng=rng,
+            )  # fmt: skip
+            part += self.offset
+            np.minimum(part, pad.deepest, out=part)
+        return true_mm
 
     def idle(self, n: int, *, rng: np.random.Generator) -> Array:
         """Images of nothing [m], (n, H, W): what `noise_of_frames` learns a sensor from."""

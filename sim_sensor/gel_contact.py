@@ -7,9 +7,10 @@ Hertz pressure is exact (Johnson, Contact Mechanics, eq. 3.42),
     I_a = 2/3 R_D(s, b^2 + s, a^2 + s),           I_b = 2/3 R_D(s, a^2 + s, b^2 + s)
 
 with s the root of x^2/(a^2 + s) + y^2/(b^2 + s) = 1, tabulated for each touch over
-t = sqrt(s) / (sqrt(s) + sqrt(a b)). Two approximations: a finite thickness h damps it by
-exp(-distance / h), and a body that is no paraboloid scales it along each ray so that the gel meets
-the body at the rim of the ellipse. Lengths here in millimetres.
+t = sqrt(s) / (sqrt(s) + sqrt(a b)). Two approximations: a
+finite thickness h damps it by (1 + distance / 8h)^-8, nearly an exponential, and a body that is no
+paraboloid scales it along each ray so that the gel meets the body at the rim of the ellipse.
+Lengths here in millimetres.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from estimator.compiled import compiled
 from estimator.depth_fit import dome
 from estimator.vectors import Array
 
-NODES = 25
+NODES = 21
 _LAST = 0.97  # of t
 
 
@@ -42,13 +43,13 @@ def free_surface(a: Array, b: Array, delta: Array) -> Array:
 
 
 @compiled
-def outside(x: float, y: float, a: float, b: float, table: Array) -> float:
-    """u / delta outside the ellipse, x along a."""
+def outside(x: float, y: float, a: float, b: float, root_ab: float, table: Array) -> float:
+    """u / delta outside the ellipse, x along a; root_ab = sqrt(a b)."""
     x2, y2, a2, b2 = x * x, y * y, a * a, b * b
     half = 0.5 * (x2 + y2 - a2 - b2)
     s = half + (half * half + x2 * b2 + y2 * a2 - a2 * b2) ** 0.5
     root = max(s, 0.0) ** 0.5
-    t = min(root / (root + (a * b) ** 0.5), _LAST * 0.999999) * ((NODES - 1) / _LAST)
+    t = min(root / (root + root_ab), _LAST * 0.999999) * ((NODES - 1) / _LAST)
     i = int(t)
     t -= i
     p = table[i]
@@ -90,12 +91,13 @@ def press_into(
         tables: Of `free_surface`.
     """
     rows, columns = out.shape[1:]
-    flat = not np.isfinite(radius)
+    flat, eighth = not np.isfinite(radius), 0.125 / thickness
     for n in range(out.shape[0]):
         x0, y0 = ats[n]
         c, s, a, b, delta, ka, kb = shapes[n]
         body, table = bodies[n], tables[n]
-        z0 = dome(x0, y0, radius)
+        z0, root_ab, inv_a, inv_b = dome(x0, y0, radius), (a * b) ** 0.5, 1.0 / a, 1.0 / b
+        bend = 0.0 if flat else 0.5 / radius
         # axes of the tangent plane at the place, in the pad's: e1, e2, e3 outwards
         e3x, e3y = (0.0, 0.0) if flat else (x0 / radius, y0 / radius)
         e3z = (1.0 - e3x * e3x - e3y * e3y) ** 0.5
@@ -104,27 +106,30 @@ def press_into(
         e2x, e2y, e2z = e3y * e1z, e3z * e1x - e3x * e1z, -e3y * e1x
         for i in range(rows):
             y = (i - 0.5 * (rows - 1)) * pitch
+            q = y - y0  # `height` along this row of a flat pad, a polynomial of p
+            h0 = q * q * (body[2] + q * (body[6] + q * body[11]))
+            h1 = q * (body[1] + q * (body[5] + q * body[10]))
+            h2, h3 = body[0] + q * (body[4] + q * body[9]), body[3] + q * body[8]
             for j in range(columns):
                 x = (j - 0.5 * (columns - 1)) * pitch
                 pad = dome(x, y, radius)
                 dx, dy, dz = x - x0, y - y0, pad - z0
                 p, q = e1x * dx + e1z * dz, e2x * dx + e2y * dy + e2z * dz
                 u, v = c * p + s * q, c * q - s * p
-                far = (u / a) ** 2 + (v / b) ** 2
+                far = (u * inv_a) ** 2 + (v * inv_b) ** 2
                 if far > 1.0:
-                    far = far**0.5
-                    rim_p, rim_q = p / far, q / far
-                    drop = height(rim_p, rim_q, body)
-                    if not flat:
-                        drop += 0.5 * (rim_p * rim_p + rim_q * rim_q) / radius
-                    meant = delta - 0.5 * (ka * u * u + kb * v * v) / (far * far)
-                    gap = (u * u + v * v) ** 0.5 * (1.0 - 1.0 / far)
-                    meet = max(delta - drop, 0.0) / max(meant, 1e-9)
-                    out[n, i, j] = (
-                        delta * outside(u, v, a, b, table) * meet * np.exp(-gap / thickness)
-                    )
+                    near = 1.0 / far**0.5
+                    rim_p, rim_q, rim_u, rim_v = p * near, q * near, u * near, v * near
+                    drop = height(rim_p, rim_q, body) + bend * (rim_p * rim_p + rim_q * rim_q)
+                    meant = delta - 0.5 * (ka * rim_u * rim_u + kb * rim_v * rim_v)
+                    gap = (u * u + v * v) ** 0.5 * (1.0 - near)
+                    damp = (1.0 + gap * eighth) ** 2
+                    damp *= damp
+                    relaxed = delta * outside(u, v, a, b, root_ab, table)
+                    out[n, i, j] = relaxed * max(delta - drop, 0.0) / (meant * damp * damp)
                 elif flat:
-                    out[n, i, j] = max(delta - height(p, q, body), 0.0)
+                    drop = h0 + p * (h1 + p * (h2 + p * (h3 + p * body[7])))
+                    out[n, i, j] = max(delta - drop, 0.0)
                 else:
                     h = 0.0
                     for _ in range(4):  # the body's surface under this pixel

@@ -93,7 +93,7 @@ def test_no_contact_is_told_and_has_no_surface(images):
 
 def test_a_batch_may_hold_touches_and_misses():
     readings = read_depth(
-        np.stack([pressed(K=((60.0, 0.0), (0.0, 20.0)), force=1.0), np.zeros((48, 64))]),
+        np.stack([pressed(K=((60.0, 0.0), (0.0, 25.0)), force=0.7), np.zeros((48, 64))]),
         PITCH,
         noise=NOISE,
     )
@@ -172,3 +172,24 @@ def test_integers_and_single_precision_are_read_too():
     single = read_depth(depth.astype(np.float32), PITCH, noise=NOISE).surface()
     assert single.tensor == pytest.approx(exact.tensor, rel=1e-3)
     assert not read_depth(np.zeros((9, 9), dtype=np.int64), PITCH).touched.any()
+
+
+def test_contacts_larger_than_the_image_are_flagged_in_99_percent():
+    """Ellipses that reach a tenth beyond the image, with noise: radii 10-60 mm, 1-5 N."""
+    rng = np.random.default_rng(2)
+    pad = GelPad(thickness=np.inf, gain=0.0, offset=0.0)
+    psi = rng.uniform(0.0, np.pi, 1500)
+    k = np.column_stack([1e3 / rng.uniform(10.0, 60.0, 1500), rng.uniform(0.0, 8.0, 1500)])
+    U = np.stack([[np.cos(psi), -np.sin(psi)], [np.sin(psi), np.cos(psi)]]).transpose(2, 0, 1)
+    K = np.einsum("bij,bj,bkj->bik", U, k, U)
+    touch = pad.ideal().press(arc_patches(K), rng=rng, force=rng.uniform(1.0, 5.0, 1500))
+    a, b = touch.ellipse.T
+    wide, high = (
+        np.hypot(a * np.sin(psi), b * np.cos(psi)),
+        np.hypot(a * np.cos(psi), b * np.sin(psi)),
+    )
+    beyond = (wide > 1.1 * 8e-3) | (high > 1.1 * 6e-3)
+    readings = read_depth(touch.depth, PITCH, noise=NOISE)
+    flagged = np.array([any("border" in flag for flag in flags) for flags in readings.flags])
+    assert beyond.sum() > 1000
+    assert flagged[beyond].mean() >= 0.99
