@@ -40,7 +40,8 @@ SURE = 0.99  # probability one hypothesis needs
 MENTIONED = 0.01  # probability from which a hypothesis matters
 MISFIT = 1e-4  # p-value of the fit below which nothing is believed of the axis
 FITS = 1e-4  # p-value from which planes count as coincident, normals as parallel or concurrent
-PIERCED = 10.0  # position errors from a contact within which an axis may not pass
+PIERCED = 10.0  # position errors from a contact within which an axis may not pass,
+PIERCED_MOST = 3e-3  # ... but no farther: of a contact hardly placed that would be anywhere [m]
 LIKELY_TURNS = frozen(0.4 * np.arange(-6, 7))  # of a sensor's directions, in its own sd
 REDUNDANT = 5  # planes that contacts must give: one more than the axis has unknowns
 MOST_GROSS = 1.0 / 3.0  # share of the contacts beyond which they are not exceptions
@@ -117,7 +118,8 @@ def pierced(readings: Readings, x: Array) -> Mask:
     gap = readings[..., POSITION:NORMAL] - x[:, None, :3]
     u = x[:, None, 3:6]
     gap = gap - np.sum(gap * u, axis=-1, keepdims=True) * u
-    return np.asarray(np.linalg.norm(gap, axis=-1) < PIERCED * readings[..., SD_POSITION])
+    near = np.minimum(PIERCED * readings[..., SD_POSITION], PIERCED_MOST)
+    return np.asarray(np.linalg.norm(gap, axis=-1) < near)
 
 
 def scaled_information(contacts: Array, size: Array, n: int) -> Array:
