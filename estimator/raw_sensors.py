@@ -38,7 +38,7 @@ class DepthPad:
         noise: Of its depth images; None estimates it from each image.
     """
 
-    pixel_pitch: float = 0.2e-3
+    pixel_pitch: float = 0.25e-3
     radius: float = float("inf")
     noise: DepthNoise | None = None
 

@@ -5,7 +5,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from estimator.raw_files import read_raw
 
 ROOT = Path(__file__).parents[1]
 DATA = ROOT / "tests" / "data"
@@ -182,6 +185,47 @@ def test_estimate_axis_takes_a_gentle_slope_for_granted_when_asked():
     )
     sure = [sum(row[i] for i, row in enumerate(x["covariance"]) if i > 1) for x in (told, gentle)]
     assert sure[1] < 0.9 * sure[0]
+
+
+@pytest.fixture(scope="module")
+def raw_job(tmp_path_factory):
+    out = tmp_path_factory.mktemp("raw")
+    return script("plan_grasp", "--sensor", "gel-depth", "--object", "barrel", "--out", out), out
+
+
+def test_the_main_job_goes_from_raw_signals_and_keeps_them(raw_job):
+    done, out = raw_job
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "Goal met" in done.stdout
+    assert "raw.npz" in {p.name for p in out.iterdir()}
+    result = json.loads((out / "result.json").read_text())
+    felt = [o for r in result["rounds"] for o in r["outcomes"]]
+    raw = read_raw(out / "raw.npz")
+    assert raw.sensor == "gel-depth"
+    assert len(raw) == len(felt)
+
+
+def test_estimate_axis_reads_raw_touches_as_the_main_job_did(raw_job):
+    """The same axis, but for the camera's belief, which the file does not hold."""
+    _, out = raw_job
+    done = script("estimate_axis", "--raw", out / "raw.npz", "--json")
+    assert done.returncode == 0, done.stderr
+    estimate = json.loads(done.stdout)
+    truth = json.loads((out / "result.json").read_text())["truth"]["axis"]
+    assert estimate["verdict"] == "determined"
+    cosine = abs(np.dot(estimate["axis"]["direction"], truth["direction"]))
+    assert np.degrees(np.arccos(min(1.0, cosine))) < 3.0
+    words = script("estimate_axis", "--raw", out / "raw.npz").stdout
+    assert "touch 1: contact reaches the border of the image" in words
+
+
+def test_estimate_axis_takes_one_file_of_either_kind(tmp_path, raw_job):
+    raw = raw_job[1] / "raw.npz"
+    refused(script("estimate_axis"), "expected one file: of contacts (JSON), or of raw touches")
+    refused(script("estimate_axis", DATA / "table8.json", "--raw", raw), "expected one file")
+    refused(script("estimate_axis", "--raw", tmp_path / "none.npz"), "there is no such file")
+    refused(script("estimate_axis", "--raw", raw, "--sensor", "taxel-array"), "reads strains")
+    refused(script("estimate_axis", "--raw", raw, "--sensor", "gel"), "raw sensor 'gel' is unknown")
 
 
 def test_estimate_axis_refuses_what_it_cannot_read(tmp_path):
