@@ -55,7 +55,7 @@ from estimator.vectors import Array, Mask
 
 FLAT_PRIOR = (10.0, 10.0)  # mean, sd of the flat curvature [1/m]: 40 mm to flat within 1.5 sd
 MEASURED = 0.8  # of the prior's sd: above that the flat curvature is not measured
-DOUBT = 2.0  # standard deviations between strains and prior: then its pull counts as an error
+DOUBT = 1.5  # standard deviations between strains and prior: then its pull counts as an error
 SECOND = 0.1  # of the peak: less than this outside the window is no contact of its own
 DEPTH_STEP = 1e-3
 
