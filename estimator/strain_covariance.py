@@ -68,7 +68,9 @@ def with_prior_pull(
 
 def body_tensors(states: Array, array: StrainArray) -> Array:
     """Curvature of the object, the finger's taken away, (B, 2, 2)."""
-    return np.asarray(relative_tensors(states) - np.diag([0.0, array.curvature]))
+    K = relative_tensors(states)
+    K[:, 1, 1] -= array.curvature
+    return K
 
 
 def ridge_covariance(
@@ -133,7 +135,7 @@ def ellipses_of(states: Array, array: StrainArray) -> tuple[Array, Array]:
 
 def relative_tensors(states: Array) -> Array:
     """(B, 2, 2)."""
-    return np.stack([states[:, [3, 5]], states[:, [5, 4]]], axis=1)
+    return np.asarray(states[:, [[3, 5], [5, 4]]])
 
 
 def surface_covariance(
