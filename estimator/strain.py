@@ -26,6 +26,7 @@ from estimator.strain_covariance import (
     inverse_information,
     ridge_covariance,
     shared_errors,
+    with_prior_pull,
 )  # fmt: skip
 from estimator.strain_flags import (
     BY_PRIOR,
@@ -54,6 +55,7 @@ from estimator.vectors import Array, Mask
 
 FLAT_PRIOR = (10.0, 10.0)  # mean, sd of the flat curvature [1/m]: 40 mm to flat within 1.5 sd
 MEASURED = 0.8  # of the prior's sd: above that the flat curvature is not measured
+DOUBT = 1.5  # standard deviations between strains and prior: then its pull counts as an error
 SECOND = 0.1  # of the peak: less than this outside the window is no contact of its own
 DEPTH_STEP = 1e-3
 
@@ -140,9 +142,13 @@ def _covariances(
     solved: Solved, curvatures: Curvatures, flat_prior: tuple[float, float], array: StrainArray
 ) -> Array:
     """Of the states, by the algorithm that found them."""
-    if curvatures != "one":
-        return inverse_information(solved.information)
     tensors = body_tensors(solved.states, array)
+    if curvatures != "one":
+        free = inverse_information(solved.information)
+        if curvatures == "two":
+            return free
+        pulled = with_prior_pull(free, tensors, flat_prior, DOUBT)
+        return np.where(solved.off_prior[:, None, None], free, pulled)
     left_out = flat_prior[0] ** 2 + flat_prior[1] ** 2
     return ridge_covariance(solved.information, tensors, left_out, array)
 

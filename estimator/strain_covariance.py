@@ -28,16 +28,49 @@ def inverse_information(information: Array) -> Array:
 def flat_curvatures(tensors: Array, covariances: Array) -> tuple[Array, Array]:
     """The object's smaller curvature and its standard deviation [1/m], (B,) each."""
     curvatures, vectors = np.linalg.eigh(tensors)
-    u = vectors[:, :, 0]
-    slope = np.zeros((len(u), 6))
-    slope[:, 3], slope[:, 4], slope[:, 5] = u[:, 0] ** 2, u[:, 1] ** 2, 2.0 * u[:, 0] * u[:, 1]
+    slope = _flat_slopes(vectors[:, :, 0])
     variance = np.einsum("bi,bij,bj->b", slope, covariances, slope)
     return curvatures[:, 0], np.sqrt(variance)
 
 
+def _flat_slopes(u: Array) -> Array:
+    """Of the smaller curvature over the state, u its direction (B, 2): (B, 6)."""
+    slope = np.zeros((len(u), 6))
+    slope[:, 3], slope[:, 4], slope[:, 5] = u[:, 0] ** 2, u[:, 1] ** 2, 2.0 * u[:, 0] * u[:, 1]
+    return slope
+
+
+def with_prior_pull(
+    covariances: Array, tensors: Array, prior: tuple[float, float], doubt: float
+) -> Array:
+    """Covariances that own up to a prior that may not be meant for this object.
+
+    Where strains and prior are more than `doubt` deviations apart, the way the prior has moved the
+    answer is added as an error. Without the prior the smaller curvature would have the variance
+    R = 1 / (1/V - 1/P) and be (kappa_2 - mean) R / P farther off.
+
+    Args:
+        covariances: Posterior, (B, 6, 6).
+        tensors: Body curvature, (B, 2, 2).
+        prior: Mean and standard deviation sqrt(P) of the smaller curvature [1/m].
+    """
+    curvatures, vectors = np.linalg.eigh(tensors)
+    slope = _flat_slopes(vectors[:, :, 0])
+    along = np.einsum("bij,bj->bi", covariances, slope)
+    V, P = np.einsum("bi,bi->b", along, slope), prior[1] ** 2
+    learnt = np.maximum(1.0 - V / P, 1e-3)
+    off = curvatures[:, 0] - prior[0]
+    far = np.abs(off) > doubt * prior[1] * np.sqrt(learnt)
+    moved = np.where(far, off / learnt / P, 0.0)  # (kappa_2 - mean) R / P over V
+    pull = along * moved[:, None]
+    return np.asarray(covariances + np.einsum("bi,bj->bij", pull, pull))
+
+
 def body_tensors(states: Array, array: StrainArray) -> Array:
     """Curvature of the object, the finger's taken away, (B, 2, 2)."""
-    return np.asarray(relative_tensors(states) - np.diag([0.0, array.curvature]))
+    K = relative_tensors(states)
+    K[:, 1, 1] -= array.curvature
+    return K
 
 
 def ridge_covariance(
@@ -102,7 +135,7 @@ def ellipses_of(states: Array, array: StrainArray) -> tuple[Array, Array]:
 
 def relative_tensors(states: Array) -> Array:
     """(B, 2, 2)."""
-    return np.stack([states[:, [3, 5]], states[:, [5, 4]]], axis=1)
+    return np.asarray(states[:, [[3, 5], [5, 4]]])
 
 
 def surface_covariance(

@@ -10,7 +10,8 @@ import numpy as np
 from estimator.response import ResponseModel
 from estimator.strain_array import StrainArray
 from estimator.strain_covariance import body_tensors, flat_curvatures, inverse_information
-from estimator.strain_fit import MOST_STEPS, Problem, fit_all
+from estimator.strain_equations import Problem
+from estimator.strain_fit import MOST_STEPS, fit_all
 from estimator.strain_flags import POOR_FIT
 from estimator.strain_start import starts
 from estimator.strain_window import Windows

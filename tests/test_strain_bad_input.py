@@ -111,14 +111,16 @@ def test_strain_beyond_the_linear_range_is_flagged_and_widened():
     assert np.all(wide > 3.0 * narrow)
 
 
-def test_round_bodies_have_no_direction():
+@pytest.mark.parametrize(("curvatures", "share"), [("two", 0.99), ("map", 0.95)])
+def test_round_bodies_have_no_direction(curvatures, share):
+    """Also where a prior that is not meant for them pulls one curvature down."""
     rng = np.random.default_rng(3)
     R = rng.uniform(15e-3, 60e-3, N)
     psi = np.deg2rad(rng.uniform(40, 140, N))
     states, _, long_axis = touches(rng, R1=R, R2=1.02 * R, psi=psi, force=rng.uniform(1, 3, N))
     valid = long_axis < 8.5e-3
-    read = read_strains(readings(rng, states)[valid], FINGER, curvatures="two")
-    assert up(read, UMBILIC, SATURATED).mean() >= 0.99
+    read = read_strains(readings(rng, states)[valid], FINGER, curvatures=curvatures)
+    assert up(read, UMBILIC, SATURATED).mean() >= share
 
 
 @pytest.mark.parametrize("apart", [5e-3, 8e-3, 12e-3])
