@@ -40,7 +40,7 @@ def test_the_estimators_example_reads_a_record(capsys):
 
 
 def test_the_readers_example_reads_raw_signals():
-    rng, body = np.random.default_rng(1), np.diag([1 / 0.2, 1 / 0.03])
+    rng, body = np.random.default_rng(1), np.diag([1 / 0.03, 1 / 0.2])
     depth = GelPad().session(rng=rng).press(arc_patches(body[None]), rng=rng, force=3.0).depth
     finger = StrainFinger().session(rng=rng)
     names = {"depth": depth}
