@@ -29,7 +29,7 @@ from rich.table import Table
 from estimator.axis import Axis, angle_between, offset_at, to_chart
 from estimator.belief import Belief
 from estimator.contact import Contact, Miss
-from estimator.raw_sensors import RAW_SENSORS
+from estimator.readers.raw_sensors import RAW_SENSORS
 from estimator.sensors import sensor_noise
 from estimator.surface import SurfaceOfRevolution
 from hand_models import load_hand
@@ -200,7 +200,7 @@ def _ended(
 def _table(options: Options, sensor: str, ended: list[Session]) -> Table:
     title = f"{sensor}: sessions to 3 deg and 2 mm, at most {options.budget} touches"
     table = Table(title=title, box=SIMPLE_HEAD, pad_edge=False)
-    headings = ("object", "runs", "goal met", "touches", "median deg", "p90", "median mm", "p90",
+    headings = ("object", "runs", "goal met %", "touches", "median deg", "p90", "median mm", "p90",
                 "wrong")  # fmt: skip
     for heading in headings:
         table.add_column(heading, justify="left" if heading == "object" else "right", no_wrap=True)
@@ -226,8 +226,8 @@ def _row(chosen: list[Session]) -> list[str]:
 
 
 def _share(share: Interval) -> str:
-    return f"{100 * share.value:.0f} % [{100 * share.low:.0f}-{100 * share.high:.0f}]"
+    return f"{100 * share.value:.0f} [{100 * share.low:.0f}-{100 * share.high:.0f}]"
 
 
 def _figure(figure: Interval) -> str:
-    return f"{figure.value:.2f} [{figure.low:.1f}-{figure.high:.1f}]"
+    return f"{figure.value:.2f} ±{0.5 * (figure.high - figure.low):.2f}"

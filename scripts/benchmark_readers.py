@@ -19,11 +19,11 @@ from rich.console import Console
 from rich.table import Table
 from scipy.optimize import least_squares
 
-from estimator.depth import read_depth
-from estimator.depth_noise import DepthNoise
-from estimator.strain import read_strains
-from estimator.strain_array import StrainArray
-from estimator.strain_model import predicted_readings, touch_state
+from estimator.readers.depth import read_depth
+from estimator.readers.depth_noise import DepthNoise
+from estimator.readers.strain import read_strains
+from estimator.readers.strain_array import StrainArray
+from estimator.readers.strain_model import predicted_readings, touch_state
 from estimator.vectors import Array
 from sim_sensor.gel import GelPad
 from sim_sensor.gel_shape import arc_patches

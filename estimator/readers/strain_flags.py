@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimator.strain_array import StrainArray
-from estimator.strain_covariance import relative_tensors
-from estimator.strain_window import FEWEST, Windows
+from estimator.readers.strain_array import StrainArray
+from estimator.readers.strain_covariance import relative_tensors
+from estimator.readers.strain_window import FEWEST, Windows
 from estimator.vectors import Array, Mask
 
 NO_CONTACT = "no contact"
