@@ -8,6 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from planner.choice import MARGIN
+from planner.motion import FORCE_GOAL
 from planner.reach_task import ReachOptions
 
 Criterion = Literal["default", "random"]
@@ -29,6 +30,7 @@ class PlannerOptions:
             sensor admits one or not [rad]: contacts that wrap around cancel it.
         criterion: "default" ranks (`planner.choice`); "random" takes what the hand reaches in no
             order and refuses nothing: the peer that benchmarks compare with.
+        force_goal: At which a touching finger stops [N].
     """
 
     reach: ReachOptions = field(default_factory=lambda: ReachOptions(starts=0, rescues=1))
@@ -39,6 +41,7 @@ class PlannerOptions:
     tries: int = 24
     offset_guard: float = OFFSET_GUARD
     criterion: Criterion = "default"
+    force_goal: float = FORCE_GOAL
 
     def __post_init__(self) -> None:
         if self.fingers_at_once not in (1, 2, 3):
@@ -46,6 +49,8 @@ class PlannerOptions:
         if self.criterion not in get_args(Criterion):
             known = ", ".join(get_args(Criterion))
             raise ValueError(f"criterion {self.criterion!r} is unknown; known are {known}")
+        if not (np.isfinite(self.force_goal) and self.force_goal > 0.0):
+            raise ValueError(f"force_goal: expected a force > 0 N, got {self.force_goal}")
         for name in ("placements", "objects", "tries"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name}: expected at least 1, got {getattr(self, name)}")

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -12,7 +14,7 @@ from estimator.belief import Belief, sample_objects
 from estimator.bounds import AxisBound
 from estimator.contact import Contact, SensorNoise
 from estimator.surface import Place, SurfaceOfRevolution
-from estimator.vectors import Array, frozen
+from estimator.vectors import Array, Index, frozen
 from hand_models.hand import Hand
 from hand_models.postures import Postures, posture_library
 from hand_models.spheres import LinkSpheres, link_spheres
@@ -23,10 +25,12 @@ from planner.motion import Approach, approach_by_base, plan_approaches
 from planner.options import PlannerOptions
 from planner.reach import Reach, ReachSolver, Unreachable
 from planner.reach_task import ReachOptions
+from planner.retreat import Retreat, plan_retreat
 from planner.solid import RevolvedSolid
 from planner.starts import Start
 
 Funnel = tuple[tuple[str, int], ...]
+Preference = Callable[[Candidates, Ranking], Index]
 
 SOLID_HEIGHTS = 101
 
@@ -64,6 +68,7 @@ class Plan:
         nearest: That singularity in words.
         label_probability: That the labels come out right; NaN where it was not computed.
         funnel: How many candidates there were, and what refused the others.
+        retreat: The hand's way out after the probes.
     """
 
     probes: tuple[Probe, ...]
@@ -76,6 +81,7 @@ class Plan:
     nearest: str
     label_probability: float
     funnel: Funnel
+    retreat: Retreat
 
 
 class NoPlan(Exception):
@@ -104,6 +110,14 @@ class _Tools:
     solver: ReachSolver
 
 
+class _Made(NamedTuple):
+    """A placement made exact: certified, with the ways to the contacts and out."""
+
+    reach: Reach
+    approaches: tuple[Approach, ...]
+    retreat: Retreat
+
+
 @lru_cache(maxsize=8)
 def _tools(hand: Hand, options: ReachOptions) -> _Tools:
     return _Tools(hand, posture_library(hand), link_spheres(hand), ReachSolver(hand, options))
@@ -130,10 +144,34 @@ def plan_probes(
         NoPlan: Not even a single touch is left; its funnel says why.
     """
     options = options or PlannerOptions()
+    most = min(options.fingers_at_once, len(hand.fingers))
+    counts = range(most, 0, -1)
+    return plan_preferred(hand, belief, sensor, counts, goal=goal, rng=rng, options=options)
+
+
+def plan_preferred(
+    hand: Hand,
+    belief: Belief,
+    sensor: SensorNoise,
+    counts: Iterable[int],
+    *,
+    goal: Goal,
+    rng: np.random.Generator,
+    options: PlannerOptions,
+    prefer: Preference | None = None,
+) -> Plan:
+    """The first number of fingers that some placement can touch with.
+
+    Args:
+        counts: Numbers of fingers, in order.
+        prefer: Puts the ranked candidates in an order of its own; None keeps the ranking's.
+    Raises:
+        NoPlan: No placement with any of them.
+    """
     tools = _tools(hand, options.reach)
     funnel: Funnel = ()
-    for count in range(min(options.fingers_at_once, len(hand.fingers)), 0, -1):
-        found = _best_placement(tools, belief, sensor, goal, options, count, rng)
+    for count in counts:
+        found = _best_placement(tools, belief, sensor, goal, options, count, rng, prefer)
         if isinstance(found, Plan):
             return _with_funnel(found, funnel)
         funnel += found
@@ -148,6 +186,7 @@ def _best_placement(
     options: PlannerOptions,
     count: int,
     rng: np.random.Generator,
+    prefer: Preference | None,
 ) -> Plan | Funnel:
     """The best placement with `count` fingers that reach certifies, or what refused them all."""
     candidates = _candidates(tools, belief.surface, options, count, rng)
@@ -167,12 +206,14 @@ def _best_placement(
     )
     if options.criterion == "random":
         ranking = replace(ranking, order=rng.permutation(len(candidates)))
+    if prefer is not None:
+        ranking = replace(ranking, order=prefer(candidates, ranking))
     funnel += tuple((f"{count} fingers: singular: {words}", n) for words, n in ranking.rejected)
     solid = _solid(belief.surface)
     failures: dict[str, int] = {}
     for i in ranking.order[: options.tries].tolist():
-        made = _made(tools, belief.surface, solid, candidates, i)
-        if isinstance(made, tuple):
+        made = _made(tools, belief, options, solid, candidates, i)
+        if isinstance(made, _Made):
             refused = tuple((f"{count} fingers: out of reach: {r}", n) for r, n in failures.items())
             return _plan(belief.surface, sensor, candidates, ranking, i, made, funnel + refused)
         failures[made] = failures.get(made, 0) + 1
@@ -208,13 +249,14 @@ def _solid(surface: SurfaceOfRevolution) -> RevolvedSolid:
 
 def _made(
     tools: _Tools,
-    surface: SurfaceOfRevolution,
+    belief: Belief,
+    options: PlannerOptions,
     solid: RevolvedSolid,
     candidates: Candidates,
     i: int,
-) -> tuple[Reach, tuple[Approach, ...]] | str:
-    """A certified reach with its approaches, or the reason why there is none."""
-    place = surface.at(candidates.theta[i], candidates.z[i])
+) -> _Made | str:
+    """A certified reach with the ways to it and out, or the reason why there is none."""
+    place = belief.surface.at(candidates.theta[i], candidates.z[i])
     names = tuple(tools.hand.fingers[k].name for k in candidates.fingers[i])
     start = Start(names, candidates.q[i], candidates.base(i))
     several = len(names) > 1
@@ -228,9 +270,13 @@ def _made(
     )
     if isinstance(reach, Unreachable):
         return reach.reason
-    if several:
-        return reach, tuple(plan_approaches(tools.hand, reach))
-    return reach, (approach_by_base(tools.hand, reach),)
+    ways = plan_approaches(tools.hand, reach) if several else (approach_by_base(tools.hand, reach),)
+    X_WB = reach.X_WB if several else ways[0].bases[0]
+    retreat = plan_retreat(
+        tools.hand, tools.spheres, belief, reach.q_standoff, X_WB, np.asarray(place.n)
+    )
+    gentle = tuple(replace(way, force_goal=options.force_goal) for way in ways)
+    return _Made(reach, gentle, retreat)
 
 
 def _plan(
@@ -239,12 +285,12 @@ def _plan(
     candidates: Candidates,
     ranking: Ranking,
     i: int,
-    made: tuple[Reach, tuple[Approach, ...]],
+    made: _Made,
     funnel: Funnel,
 ) -> Plan:
-    reach, approaches = made
+    reach = made.reach
     probes = []
-    for j, approach in enumerate(approaches):
+    for j, approach in enumerate(made.approaches):
         place = Place(float(candidates.theta[i, j]), float(candidates.z[i, j]))
         expected = surface.contact(place, sensor)
         probes.append(Probe(approach.finger, place, expected, reach.q, approach))
@@ -261,6 +307,7 @@ def _plan(
         nearest=ranking.nearest[i],
         label_probability=float(ranking.label_probability[i]),
         funnel=funnel,
+        retreat=made.retreat,
     )
 
 
