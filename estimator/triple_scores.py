@@ -50,8 +50,8 @@ def triple_scores(information: Array, before: Array, triples: Index) -> Array:
     information there. Permuting a triple or moving the world changes nothing.
 
     Args:
-        information: Of each place on each object, zero where it is missed, (B, G, 5, 5), `in_goals`.
-        before: What is known before the touches, positive definite, (5, 5), `in_goals`.
+        information: Of each place on each object `in_goals`, zero where missed, (B, G, 5, 5).
+        before: What is known before the touches `in_goals`, positive definite, (5, 5).
         triples: Places of each triple, (T, 3); fastest where the last one runs fastest.
     Returns:
         (T,); 0 is an rms error of one goal, log 2 of two.
@@ -124,4 +124,5 @@ def _trace(m: Array) -> float:
     s = 1.0 / (s00 * s11 - s10 * s10)
     square_0, square_1 = x00 * x00 + x10 * x10, x01 * x01 + x11 * x11
     cross = x00 * x01 + x10 * x11
-    return i00 + i11 + s * (s11 * (1.0 + square_0) + s00 * (1.0 + square_1) - 2.0 * s10 * cross)
+    last = s11 * (1.0 + square_0) + s00 * (1.0 + square_1) - 2.0 * s10 * cross
+    return float(i00 + i11 + s * last)

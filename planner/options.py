@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal, get_args
+from typing import get_args
 
 import numpy as np
 
 from planner.choice import MARGIN
+from planner.criteria import Criterion
 from planner.reach_task import ReachOptions
 
-Criterion = Literal["default", "random"]
 OFFSET_GUARD = float(np.deg2rad(5.0))
 
 
@@ -27,8 +27,10 @@ class PlannerOptions:
         tries: How many of the best placements are handed to the optimiser.
         offset_guard: Common rotation of the directions that a plan is proof against, whether the
             sensor admits one or not [rad]: contacts that wrap around cancel it.
-        criterion: "default" ranks (`planner.choice`); "random" takes what the hand reaches in no
-            order and refuses nothing: the peer that benchmarks compare with.
+        criterion: By what placements are put in order: `planner.criteria` says what each means.
+        grasp_height: Where along the believed axis the offset counts, from its point: the place
+            of the later grasp [m].
+        certify: Whether a plan says how good it is among all touches that there are.
     """
 
     reach: ReachOptions = field(default_factory=lambda: ReachOptions(starts=0, rescues=1))
@@ -38,7 +40,9 @@ class PlannerOptions:
     objects: int = 20
     tries: int = 24
     offset_guard: float = OFFSET_GUARD
-    criterion: Criterion = "default"
+    criterion: Criterion = "information"
+    grasp_height: float = 0.0
+    certify: bool = True
 
     def __post_init__(self) -> None:
         if self.fingers_at_once not in (1, 2, 3):

@@ -20,15 +20,19 @@ from planner.candidates import Candidates, placement_candidates, single_candidat
 from planner.choice import Ranking, rank
 from planner.goal import Goal
 from planner.motion import Approach, approach_by_base, plan_approaches
+from planner.optimum import ChoiceCertificate, certificate
 from planner.options import PlannerOptions
 from planner.reach import Reach, ReachSolver, Unreachable
 from planner.reach_task import ReachOptions
+from planner.risk import Risk, risks
 from planner.solid import RevolvedSolid
 from planner.starts import Start
+from planner.worth import Worth, guarded
 
 Funnel = tuple[tuple[str, int], ...]
 
 SOLID_HEIGHTS = 101
+RISK_OBJECTS = 40
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +68,8 @@ class Plan:
         nearest: That singularity in words.
         label_probability: That the labels come out right; NaN where it was not computed.
         funnel: How many candidates there were, and what refused the others.
+        risks: What is at least 5 % likely to leave the axis untold, the likeliest first.
+        choice: How good these touches are among all that there are; None where not asked.
     """
 
     probes: tuple[Probe, ...]
@@ -76,6 +82,8 @@ class Plan:
     nearest: str
     label_probability: float
     funnel: Funnel
+    risks: tuple[Risk, ...] = ()
+    choice: ChoiceCertificate | None = None
 
 
 class NoPlan(Exception):
@@ -155,18 +163,11 @@ def _best_placement(
     if len(candidates) == 0:
         return funnel
     samples = sample_objects(belief, options.objects, rng=rng)
-    margin = options.margin if options.criterion == "default" else 0.0
     ranking = rank(
-        candidates,
-        belief,
-        samples,
-        sensor,
-        goal,
-        margin=margin,
-        offset_guard=options.offset_guard,
-    )
-    if options.criterion == "random":
-        ranking = replace(ranking, order=rng.permutation(len(candidates)))
+        candidates, belief, samples, sensor, goal,
+        margin=options.margin, offset_guard=options.offset_guard, height=options.grasp_height,
+        criterion=options.criterion, rng=rng,
+    )  # fmt: skip
     funnel += tuple((f"{count} fingers: singular: {words}", n) for words, n in ranking.rejected)
     solid = _solid(belief.surface)
     failures: dict[str, int] = {}
@@ -174,9 +175,29 @@ def _best_placement(
         made = _made(tools, belief.surface, solid, candidates, i)
         if isinstance(made, tuple):
             refused = tuple((f"{count} fingers: out of reach: {r}", n) for r, n in failures.items())
-            return _plan(belief.surface, sensor, candidates, ranking, i, made, funnel + refused)
+            plan = _plan(belief.surface, sensor, candidates, ranking, i, made, funnel + refused)
+            worth = Worth(
+                belief, samples, guarded(sensor, options.offset_guard), goal, options.grasp_height
+            )
+            return _judged(plan, worth, ranking, i, options, rng)
         failures[made] = failures.get(made, 0) + 1
     return funnel + tuple((f"{count} fingers: out of reach: {r}", n) for r, n in failures.items())
+
+
+def _judged(
+    plan: Plan,
+    worth: Worth,
+    ranking: Ranking,
+    i: int,
+    options: PlannerOptions,
+    rng: np.random.Generator,
+) -> Plan:
+    """The plan with its risks, on objects it was not chosen by, and its certificate."""
+    others = sample_objects(worth.belief, RISK_OBJECTS, rng=rng.spawn(1)[0])
+    theta, z = np.array([(probe.place.theta, probe.place.z) for probe in plan.probes]).T
+    found = risks(replace(worth, samples=others), theta, z, margin=options.margin)
+    choice = certificate(worth, ranking, i, margin=options.margin) if options.certify else None
+    return replace(plan, risks=found, choice=choice)
 
 
 def _candidates(

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from estimator.axis import Axis
-from estimator.information import contact_information, predicted_covariance
+from estimator.information import contact_information, known_before, predicted_covariance
 from estimator.prior import coarse_prior
 from estimator.profile import barrel
 from estimator.sensors import SENSORS
@@ -16,17 +16,12 @@ from estimator.surface import SurfaceOfRevolution
 from estimator.triple_scores import in_goals, triple_scores
 
 ANGLE, OFFSET = np.deg2rad(3.0), 2e-3
-COMMON = np.deg2rad(5.0)
+COMMON = float(np.deg2rad(5.0))
 PRIOR = coarse_prior(
     Axis([0.0, 0.0, 0.0], [0.0, 0.0, 1.0]), angle=0.26, offset=0.015, radius=0.033, radius_sd=0.008
 )
+BEFORE = known_before(PRIOR.covariance, COMMON)
 THETA, Z = np.deg2rad([0.0, 40.0, 110.0, 170.0, 230.0, 300.0]), 1e-3 * np.arange(-25, 35, 10)
-
-
-def before():
-    known = np.zeros((5, 5))
-    known[:4, :4], known[4, 4] = np.linalg.inv(PRIOR.covariance), COMMON**-2
-    return known
 
 
 def grid(axes, theta=THETA, z=Z):
@@ -48,7 +43,7 @@ def scored(information, triples, height=0.0):
     def scaled(J):
         return in_goals(J, angle=ANGLE, offset=OFFSET, height=height)
 
-    return triple_scores(scaled(information), scaled(before()), triples)
+    return triple_scores(scaled(information), scaled(BEFORE), triples)
 
 
 def brute_force(information, triples, height=0.0):
@@ -136,11 +131,11 @@ def test_the_place_of_the_grasp_counts():
     ],
 )
 def test_what_does_not_fit_is_refused(change, message):
-    given_ = {"information": grid(drawn_axes(1)), "before": before(), "triples": ALL} | change
+    given_ = {"information": grid(drawn_axes(1)), "before": BEFORE, "triples": ALL} | change
     with pytest.raises(ValueError, match=message):
         triple_scores(**given_)
 
 
 def test_a_goal_of_zero_is_refused():
     with pytest.raises(ValueError, match="angle and offset > 0"):
-        in_goals(before(), angle=0.0, offset=OFFSET)
+        in_goals(BEFORE, angle=0.0, offset=OFFSET)
