@@ -66,18 +66,28 @@ def _fill_information(readings: Readings, lines: Array, out: Array) -> None:
                     out[s, i, k, j] = fisher[j, k]
 
 
-def predicted_covariance(information: Array, prior: Array, direction_offset: float) -> Array:
-    """Covariance of the axis after touches worth `information` (..., 5, 5).
+def known_before(prior: Array, direction_offset: float) -> Array:
+    """Information before the touches about (t1, t2, w1, w2, delta), (5, 5).
 
     Args:
         prior: Covariance of the axis before, (4, 4).
         direction_offset: Prior sd of the common rotation [rad].
+    """
+    before = np.zeros((WITH_ROTATION, WITH_ROTATION))
+    before[:4, :4] = np.linalg.inv(prior)
+    before[4, 4] = 1.0 / max(direction_offset**2, 1e-12)
+    return before
+
+
+def predicted_covariance(information: Array, prior: Array, direction_offset: float) -> Array:
+    """Covariance of the axis after touches worth `information` (..., 5, 5).
+
+    Args:
+        prior, direction_offset: As `known_before` takes them.
     Returns:
         (..., 4, 4), the common rotation marginalised.
     """
-    before = np.zeros((5, 5))
-    before[:4, :4] = np.linalg.inv(prior)
-    before[4, 4] = 1.0 / max(direction_offset**2, 1e-12)
+    before = known_before(prior, direction_offset)
     return np.asarray(np.linalg.inv(information + before)[..., :4, :4])
 
 

@@ -5,12 +5,12 @@ parallels and normals that meet on the axis" has three parts here. Singular trip
 with a margin that holds for nine in ten objects drawn from the belief. The corrected bound of
 eqs (64)-(72) for the best *pair* prefers pairs near 90 degrees. The third contact follows what it
 is worth: the expected error of the axis after the touches, misses included, and the odds that the
-labels come out right.
+labels come out right. Other criteria are for comparison (`planner.criteria`).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -24,16 +24,16 @@ from estimator.information import (
     predicted_covariance,
 )
 from estimator.prior import AxisPrior
-from estimator.singular import SINGULARITIES, margins
+from estimator.singular import SINGULARITIES
 from estimator.surface import Geometry
 from estimator.vectors import Array, Index
 from planner.candidates import Candidates
+from planner.criteria import REFUSING, Criterion, Merits, costs
 from planner.goal import Goal
-from planner.prospects import Prospects, prospects, with_earlier
+from planner.prospects import Prospects, prospects
+from planner.worth import Worth, guarded
 
 MARGIN = 0.08  # from every singularity, in nine of ten sampled objects
-DOUBTFUL_OBJECTS = 0.1
-BOUND_WEIGHT = 0.2
 MISLABEL_COST = 4.0  # a wrong labelling is this much worse, as a logarithm of error
 SHORT_LIST = 20
 ODDS_OBJECTS = 2
@@ -44,9 +44,11 @@ class Ranking:
     """Candidates in order of merit, best first; arrays over them.
 
     Args:
+        touches: How many each candidate makes.
         order: Indices into the candidates.
-        cost: What the order goes by: the logarithm of the expected error in goals, and what the
-            bound and doubtful labels add.
+        cost: What the order goes by, by the criterion; `information` takes the logarithm of the
+            expected error and what the bound and doubtful labels add.
+        value: Expected error of the axis after the touches, in goals.
         angle, offset: Expected error of the axis after the touches [rad], [m].
         covariance: Predicted for the believed object, (N, 4, 4).
         pair_bound: Worst case of the axis from the best pair, eqs (64)-(72) corrected.
@@ -59,8 +61,10 @@ class Ranking:
         rejected: How many candidates fell here, by reason.
     """
 
+    touches: int
     order: Index
     cost: Array
+    value: Array
     angle: Array
     offset: Array
     covariance: Array
@@ -81,55 +85,72 @@ def rank(
     *,
     margin: float = MARGIN,
     offset_guard: float = 0.0,
+    height: float = 0.0,
+    criterion: Criterion = "information",
+    rng: np.random.Generator | None = None,
 ) -> Ranking:
     """Refuse and rank.
 
     Args:
         samples: Objects drawn from the belief.
-        margin: Smallest margin from a singularity; zero ranks all.
+        margin: Smallest margin from a singularity; zero ranks all, and so do the criteria that
+            refuse nothing.
         offset_guard: Common rotation of the directions that the expected error reckons with beside
             what the sensor admits [rad]; bound and predicted covariance are the sensor's own.
+        height: Of the later grasp above the believed axis' point: where the offset counts [m].
+        rng: For the criterion `random` only.
     """
+    worth = Worth(belief, samples, guarded(noise, offset_guard), goal, height)
     place = belief.surface.at(candidates.theta, candidates.z)
     landed = prospects(samples, place.p, place.n)
-    common = float(np.hypot(noise.direction_offset, offset_guard))
-    guarded = replace(noise, direction_offset=common)
-    value, angle, offset = _expected_error(belief, landed, guarded, goal)
-    covariance = _believed_covariance(belief, place, noise)
+    after = worth.covariances(landed)
+    value, angle, offset = _expected_error(after)
     bound, best_bound = _pair_bound(candidates.theta, place, noise)
-    margins_at, nearest = _margins(belief, landed, samples)
-    cost = np.log(value) + BOUND_WEIGHT * np.log(bound.angle / best_bound)
-    kept = np.nonzero(margins_at >= margin)[0]
+    low = worth.least_margins(landed)  # (N, K)
+    margins_at, nearest = low.min(axis=1), _named(low)
+    merits = Merits(candidates.theta, candidates.z, value, after, bound, best_bound, belief, goal)
+    cost = costs(criterion, merits, rng)
+    least = margin if criterion in REFUSING else 0.0
+    kept = np.nonzero(margins_at >= least)[0]
     order = kept[np.argsort(cost[kept], kind="stable")].astype(np.intp)
-    short = order[:SHORT_LIST]
     probability = np.full(len(cost), np.nan)
-    if len(short) and candidates.theta.shape[1] > 1 and not belief.contacts:
-        probability[short] = _label_probability(belief, landed, short, noise)
-        cost[short] += MISLABEL_COST * (1.0 - probability[short])
-    order = np.concatenate([short[np.argsort(cost[short], kind="stable")], order[SHORT_LIST:]])
+    if criterion == "information" and candidates.theta.shape[1] > 1 and not belief.contacts:
+        order = _by_labels(order, cost, probability, belief, landed, noise)
     return Ranking(
-        order, cost, angle, offset, covariance, bound, margins_at, nearest, probability,
-        landed.hit.mean(axis=(0, 2)), _fallen(margins_at, nearest, margin),
+        candidates.theta.shape[1], order, cost, value, goal.angle * angle, goal.offset * offset,
+        _believed_covariance(belief, place, noise), bound, margins_at, nearest, probability,
+        landed.hit.mean(axis=(0, 2)), _fallen(margins_at, nearest, least),
     )  # fmt: skip
 
 
-def _expected_error(
-    belief: Belief, landed: Prospects, noise: SensorNoise, goal: Goal
-) -> tuple[Array, Array, Array]:
-    """Geometric mean over objects: in goals, of direction [rad], of position [m].
+def _expected_error(after: Array) -> tuple[Array, Array, Array]:
+    """Geometric mean over objects, in goals: of both, of direction, of position, each (N,).
 
     The mean of the logarithm is the expected information. A mean square would be ruled by the few
     objects that a finger misses, and would huddle the touches where nothing can be missed.
+
+    Args:
+        after: Covariances after the touches, in goals, (B, N, 4, 4).
     """
-    B, N, m = landed.theta.shape
-    each = contact_information(landed.geometry, landed.points, landed.directions, noise)
-    each = each.reshape(B, N, m, 5, 5) * landed.hit[..., None, None]
-    after = predicted_covariance(each.sum(axis=2), belief.covariance, noise.direction_offset)
     offset2 = np.einsum("bnii->bn", after[..., :2, :2])
     angle2 = np.einsum("bnii->bn", after[..., 2:, 2:])
-    squares = (angle2 / goal.angle**2 + offset2 / goal.offset**2, angle2, offset2)
-    value, angle, offset = (np.exp(0.5 * np.log(x).mean(axis=0)) for x in squares)
+    value, angle, offset = (
+        np.exp(0.5 * np.log(x).mean(axis=0)) for x in (angle2 + offset2, angle2, offset2)
+    )
     return value, angle, offset
+
+
+def _by_labels(
+    order: Index, cost: Array, probability: Array, belief: Belief, landed: Prospects,
+    noise: SensorNoise,
+) -> Index:  # fmt: skip
+    """The order with the short list's label odds asked and charged; fills both arrays there."""
+    short = order[:SHORT_LIST]
+    if len(short):
+        probability[short] = _label_probability(belief, landed, short, noise)
+        cost[short] += MISLABEL_COST * (1.0 - probability[short])
+    again = short[np.argsort(cost[short], kind="stable")]
+    return np.concatenate([again, order[SHORT_LIST:]])
 
 
 def _believed_covariance(belief: Belief, place: Geometry, noise: SensorNoise) -> Array:
@@ -160,22 +181,11 @@ def _pair_bound(theta: Array, place: Geometry, noise: SensorNoise) -> tuple[Axis
     ), ideal
 
 
-def _margins(
-    belief: Belief, landed: Prospects, samples: SampledObjects
-) -> tuple[Array, tuple[str, ...]]:
-    """Margin that nine of ten sampled objects keep, and what it is kept from.
-
-    Of the triple that the touches make together with the contacts there already are; with more
-    than three contacts in all no single triple has to be good.
-    """
-    N = landed.theta.shape[1]
-    earlier = np.array([c.position for c in belief.contacts]).reshape(-1, 3)
-    triples = with_earlier(landed, samples, earlier)
-    if triples is None:
-        return np.full(N, np.inf), ("",) * N
-    low = np.quantile(margins(triples).values, DOUBTFUL_OBJECTS, axis=0)  # (N, K)
-    nearest = np.argmin(low, axis=1)
-    return low.min(axis=1), tuple(SINGULARITIES[k].words for k in nearest)
+def _named(low: Array) -> tuple[str, ...]:
+    """The singularity nearest to each candidate in words, "" where none can be."""
+    if low.shape[1] < len(SINGULARITIES):
+        return ("",) * len(low)
+    return tuple(SINGULARITIES[k].words for k in np.argmin(low, axis=1))
 
 
 def _label_probability(

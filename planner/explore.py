@@ -88,7 +88,7 @@ def _plan(
     options: PlannerOptions,
 ) -> Plan:
     """A touch that tells the axes apart where several are left, a placement otherwise."""
-    if _ambiguous(belief) and options.criterion != "random":
+    if _ambiguous(belief) and options.criterion == "information":
         try:
             return next_touch(hand, belief, sensor, goal=goal, rng=rng, options=options)
         except NoPlan:

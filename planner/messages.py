@@ -15,6 +15,7 @@ from estimator.contact import Contact, Miss
 from estimator.records import axis_record, contact_record, estimate_record
 from hand_models.hand import Hand
 from planner.explore import Step
+from planner.optimum import ChoiceCertificate
 from planner.plan import Plan, Probe
 
 
@@ -55,8 +56,15 @@ def plan_record(plan: Plan) -> dict[str, Any]:
         "margin": _finite(plan.margin),
         "nearest_singularity": plan.nearest,
         "label_probability": _finite(plan.label_probability),
+        "risks": [{"name": risk.name, "chance": risk.chance} for risk in plan.risks],
+        "choice": None if plan.choice is None else _choice_record(plan.choice),
         "funnel": [{"reason": reason, "count": count} for reason, count in plan.funnel],
     }
+
+
+def _choice_record(choice: ChoiceCertificate) -> dict[str, Any]:
+    """Expected errors in goals, null where there is none."""
+    return {name: _finite(value) for name, value in vars(choice).items()}
 
 
 def probe_record(probe: Probe) -> dict[str, Any]:

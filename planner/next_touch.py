@@ -51,7 +51,8 @@ def next_touch(
     Raises:
         NoPlan: No finger reaches the believed surface.
     """
-    options = replace(options or PlannerOptions(), margin=0.0)
+    options = options or PlannerOptions()
+    options = replace(options, margin=0.0, criterion="information", certify=False)
     seconds = _travel(start) if per_second and start is not None else None
 
     def prefer(candidates: Candidates, ranking: Ranking) -> Index:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal, get_args
+from typing import get_args
 
 import numpy as np
 
 from planner.choice import MARGIN
+from planner.criteria import Criterion
 from planner.motion import FORCE_GOAL
 from planner.reach_task import ReachOptions
 
-Criterion = Literal["default", "random"]
 OFFSET_GUARD = float(np.deg2rad(5.0))
 
 
@@ -28,8 +28,10 @@ class PlannerOptions:
         tries: How many of the best placements are handed to the optimiser.
         offset_guard: Common rotation of the directions that a plan is proof against, whether the
             sensor admits one or not [rad]: contacts that wrap around cancel it.
-        criterion: "default" ranks (`planner.choice`); "random" takes what the hand reaches in no
-            order and refuses nothing: the peer that benchmarks compare with.
+        criterion: By what placements are put in order: `planner.criteria` says what each means.
+        grasp_height: Where along the believed axis the offset counts, from its point: the place
+            of the later grasp [m].
+        certify: Whether a plan says how good it is among all touches that there are.
         force_goal: At which a touching finger stops [N].
     """
 
@@ -40,7 +42,9 @@ class PlannerOptions:
     objects: int = 20
     tries: int = 24
     offset_guard: float = OFFSET_GUARD
-    criterion: Criterion = "default"
+    criterion: Criterion = "information"
+    grasp_height: float = 0.0
+    certify: bool = True
     force_goal: float = FORCE_GOAL
 
     def __post_init__(self) -> None:

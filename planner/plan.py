@@ -12,9 +12,9 @@ import pinocchio as pin
 
 from estimator.belief import Belief, sample_objects
 from estimator.bounds import AxisBound
-from estimator.contact import Contact, SensorNoise
+from estimator.contact import SensorNoise
 from estimator.surface import Place, SurfaceOfRevolution
-from estimator.vectors import Array, Index, frozen
+from estimator.vectors import Index, frozen
 from hand_models.hand import Hand
 from hand_models.postures import Postures, posture_library
 from hand_models.spheres import LinkSpheres, link_spheres
@@ -22,82 +22,23 @@ from planner.candidates import Candidates, placement_candidates, single_candidat
 from planner.choice import Ranking, rank
 from planner.goal import Goal
 from planner.motion import Approach, approach_by_base, plan_approaches
+from planner.optimum import certificate
 from planner.options import PlannerOptions
+from planner.plan_types import Funnel, NoPlan, Plan, Probe
 from planner.reach import Reach, ReachSolver, Unreachable
 from planner.reach_task import ReachOptions
 from planner.retreat import Retreat, plan_retreat
+from planner.risk import risks
 from planner.solid import RevolvedSolid
 from planner.starts import Start
+from planner.worth import Worth, guarded
 
-Funnel = tuple[tuple[str, int], ...]
+__all__ = ["NoPlan", "Plan", "Probe", "plan_preferred", "plan_probes"]
+
 Preference = Callable[[Candidates, Ranking], Index]
 
 SOLID_HEIGHTS = 101
-
-
-@dataclass(frozen=True, eq=False)
-class Probe:
-    """One touch to make.
-
-    Args:
-        finger: Which finger.
-        place: Where on the believed surface.
-        expected: The contact if the object is as believed (first row the parallel's).
-        q: Joint positions with the pad on the contact [rad].
-        approach: The way there, and beyond, should the object be farther away.
-    """
-
-    finger: str
-    place: Place
-    expected: Contact
-    q: Array
-    approach: Approach
-
-
-@dataclass(frozen=True, eq=False)
-class Plan:
-    """Probes of one placement of the hand, in order, and why these.
-
-    Args:
-        probes: One for each finger that touches.
-        reach: Joint angles and base pose with all pads on their contacts, certified.
-        bound: Worst case of the axis from the best pair of the probes.
-        covariance: Of the axis after the probes, if the object is as believed, (4, 4).
-        angle, offset: Expected error of the axis after them, over the belief [rad], [m].
-        margin: From the nearest singularity, in nine of ten objects; inf below three contacts.
-        nearest: That singularity in words.
-        label_probability: That the labels come out right; NaN where it was not computed.
-        funnel: How many candidates there were, and what refused the others.
-        retreat: The hand's way out after the probes.
-    """
-
-    probes: tuple[Probe, ...]
-    reach: Reach
-    bound: AxisBound
-    covariance: Array
-    angle: float
-    offset: float
-    margin: float
-    nearest: str
-    label_probability: float
-    funnel: Funnel
-    retreat: Retreat
-
-
-class NoPlan(Exception):
-    """Nothing that this hand reaches would do.
-
-    Attributes:
-        funnel: What refused the candidates, with counts, in order.
-    """
-
-    def __init__(self, funnel: Funnel) -> None:
-        self.funnel = funnel
-        told = ", ".join(f"{reason} {count}" for reason, count in funnel if count)
-        super().__init__(
-            f"no placement of the hand makes good contacts: {told}. A wider pad cone, a larger "
-            "workspace, or an object nearer to the hand would help"
-        )
+RISK_OBJECTS = 40
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,18 +135,11 @@ def _best_placement(
     if len(candidates) == 0:
         return funnel
     samples = sample_objects(belief, options.objects, rng=rng)
-    margin = options.margin if options.criterion == "default" else 0.0
     ranking = rank(
-        candidates,
-        belief,
-        samples,
-        sensor,
-        goal,
-        margin=margin,
-        offset_guard=options.offset_guard,
-    )
-    if options.criterion == "random":
-        ranking = replace(ranking, order=rng.permutation(len(candidates)))
+        candidates, belief, samples, sensor, goal,
+        margin=options.margin, offset_guard=options.offset_guard, height=options.grasp_height,
+        criterion=options.criterion, rng=rng,
+    )  # fmt: skip
     if prefer is not None:
         ranking = replace(ranking, order=prefer(candidates, ranking))
     funnel += tuple((f"{count} fingers: singular: {words}", n) for words, n in ranking.rejected)
@@ -215,9 +149,29 @@ def _best_placement(
         made = _made(tools, belief, options, solid, candidates, i)
         if isinstance(made, _Made):
             refused = tuple((f"{count} fingers: out of reach: {r}", n) for r, n in failures.items())
-            return _plan(belief.surface, sensor, candidates, ranking, i, made, funnel + refused)
+            plan = _plan(belief.surface, sensor, candidates, ranking, i, made, funnel + refused)
+            worth = Worth(
+                belief, samples, guarded(sensor, options.offset_guard), goal, options.grasp_height
+            )
+            return _judged(plan, worth, ranking, i, options, rng)
         failures[made] = failures.get(made, 0) + 1
     return funnel + tuple((f"{count} fingers: out of reach: {r}", n) for r, n in failures.items())
+
+
+def _judged(
+    plan: Plan,
+    worth: Worth,
+    ranking: Ranking,
+    i: int,
+    options: PlannerOptions,
+    rng: np.random.Generator,
+) -> Plan:
+    """The plan with its risks, on objects it was not chosen by, and its certificate."""
+    others = sample_objects(worth.belief, RISK_OBJECTS, rng=rng.spawn(1)[0])
+    theta, z = np.array([(probe.place.theta, probe.place.z) for probe in plan.probes]).T
+    found = risks(replace(worth, samples=others), theta, z, margin=options.margin)
+    choice = certificate(worth, ranking, i, margin=options.margin) if options.certify else None
+    return replace(plan, risks=found, choice=choice)
 
 
 def _candidates(

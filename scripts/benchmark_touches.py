@@ -49,7 +49,7 @@ from sim_sensor.world import TouchRecord, World
 
 SETTINGS = ("coarse", "weak", "offset", "told")
 OFFSET = float(np.deg2rad(8.0))
-CRITERIA: tuple[Criterion, ...] = ("default", "random")
+CRITERIA: tuple[Criterion, ...] = ("information", "random")
 
 
 @dataclass(frozen=True)
@@ -239,7 +239,8 @@ def _table(setting: str, objects: tuple[str, ...], outcomes: list[Outcome]) -> T
                 and o.criterion == criterion
                 and (name == "all" or o.object == name)
             ]
-            table.add_row(name, "planned" if criterion == "default" else "random", *_row(chosen))
+            touched = "planned" if criterion == "information" else "random"
+            table.add_row(name, touched, *_row(chosen))
     return table
 
 

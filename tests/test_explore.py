@@ -147,7 +147,7 @@ def test_a_budget_of_nothing_is_refused():
     [
         ({"fingers_at_once": 4}, "fingers_at_once: expected 1, 2 or 3, got 4"),
         ({"placements": 0}, "placements: expected at least 1"),
-        ({"criterion": "best"}, "criterion 'best' is unknown; known are default, random"),
+        ({"criterion": "best"}, "criterion 'best' is unknown; known are information, pair-bound, "),
     ],
 )
 def test_bad_options_are_named(options, message):

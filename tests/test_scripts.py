@@ -256,7 +256,7 @@ def test_benchmark_of_touches_runs(tmp_path):
     done = script("benchmark", "touches", *chosen)
     assert done.returncode == 0, done.stderr
     runs = [json.loads(line) for line in lines.read_text().splitlines()]
-    assert [run["criterion"] for run in runs] == ["default", "random"]
+    assert [run["criterion"] for run in runs] == ["information", "random"]
 
 
 def test_benchmark_of_estimators_runs(tmp_path):
