@@ -3,8 +3,8 @@
 Contacts before and after a placement of the hand are read apart, each with what was believed
 before any touch. Two axes of one object agree within their covariances, so the squared distance of
 the two in the chart is chi-square with four degrees of freedom; both share the prior and the
-sensor's offsets, which makes the test a cautious one. A single fit of all contacts would see less:
-the profile is unknown and gives way.
+sensor's offsets, which makes the test a cautious one. The fit of all contacts together is the other
+test: it sees what goes on within a placement, and less between them, where the profile gives way.
 
 What is done about it: earlier contacts count only as a belief, widened by the motion; and where
 contacts keep contradicting each other, each counts as worse placed by as much as the object moves.
@@ -26,7 +26,8 @@ from estimator.estimate import Hypothesis
 from estimator.prior import AxisPrior
 from estimator.vectors import Array, frozen
 
-ALARM = 1e-3  # probability of a false alarm at a placement
+ALARM = 0.01  # probability of a false alarm at a placement, by either test
+ONCE_BITTEN = 0.1  # the same after a first alarm, when the next placement has to agree
 MENTIONED = 0.01  # hypotheses that may be the right one
 RESTLESS = 3  # surprises from which the object counts as moving all the time
 LEAST_MOTION = (3e-3, float(np.deg2rad(3.0)))  # rms by which a belief is widened [m], [rad]
@@ -78,10 +79,11 @@ class Learnt:
 def learn(known: Learnt, outcomes: Sequence[Contact | Miss]) -> Learnt:
     """What is known after one placement's touches, contradictions answered."""
     felt = tuple(_as_sure(touch, known.restless) for touch in outcomes)
-    motion = motion_between(known.belief, felt)
-    if motion is None:
+    belief = update(known.belief, felt)
+    motion = motion_between(known.belief, belief, felt)
+    if motion is None or motion.p_value > (ONCE_BITTEN if known.surprises else ALARM):
         agreed = known.settled or any(isinstance(touch, Contact) for touch in felt)
-        return replace(known, belief=update(known.belief, felt), settled=agreed, surprise=None)
+        return replace(known, belief=belief, settled=agreed, surprise=None)
     surprises, restless = known.surprises + 1, known.restless
     words = f"{motion.words}. Earlier contacts now count only as a wider prior"
     if surprises >= RESTLESS:
@@ -92,15 +94,16 @@ def learn(known: Learnt, outcomes: Sequence[Contact | Miss]) -> Learnt:
     return Learnt(belief, False, words, surprises, restless)
 
 
-def motion_between(before: Belief, later: Sequence[Contact | Miss]) -> Motion | None:
-    """The motion that later touches show against the belief before; None where they show none.
+def motion_between(before: Belief, after: Belief, later: Sequence[Contact | Miss]) -> Motion | None:
+    """The motion that later touches show, however little; None where they can show none.
 
     Args:
         before: With two contacts or more: fewer say too little of an axis.
+        after: The belief that takes earlier and later touches for those of an object at rest.
         later: Touches made since.
     """
     contacts = [touch for touch in later if isinstance(touch, Contact)]
-    if len(before.contacts) < 2 or not contacts:
+    if len(before.contacts) < 2 or not contacts or after.estimate is None:
         return None
     alone = update(_untouched(before), contacts)
     pairs = [
@@ -109,10 +112,10 @@ def motion_between(before: Belief, later: Sequence[Contact | Miss]) -> Motion | 
         for b in alone.hypotheses
         if min(a.probability, b.probability) > MENTIONED
     ]
-    p_value = max((float(chi2.sf(square, 4)) for square, _ in pairs), default=1.0)
-    if p_value > ALARM:
+    if not pairs:
         return None
-    x = min(pairs, key=lambda pair: pair[0])[1]
+    square, x = min(pairs, key=lambda pair: pair[0])
+    p_value = min(float(chi2.sf(square, 4)), after.estimate.p_value)
     return Motion(float(np.hypot(*x[:2])), float(np.hypot(*x[2:])), p_value)
 
 

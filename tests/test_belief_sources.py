@@ -76,10 +76,10 @@ def test_errors_that_whole_patches_share_widen_the_region():
     rng = np.random.default_rng(2)
     points, surface = half_seen(PROFILES["can"], rng, noise=0.5e-3, n=1000)
     theta, _, z = surface.cylindrical(points)
-    wave = 0.7e-3 * np.sin(9.0 * theta) * np.cos(130.0 * z)
+    wave = 0.7e-3 * np.sin(4.0 * theta) * np.cos(50.0 * z)
     normals = surface.at(theta, z).n
     plain, warped = fit_cloud(points), fit_cloud(points + wave[:, None] * normals)
-    assert warped.inflation > 3.0 > plain.inflation
+    assert warped.inflation > 2.0 * plain.inflation
     assert np.trace(warped.covariance[2:, 2:]) > 2.0 * np.trace(plain.covariance[2:, 2:])
 
 

@@ -1,4 +1,4 @@
-"""Where things go wrong, the session ends well: the goal, or a clear verdict, never a wrong axis."""
+"""Where things go wrong, a session ends well: the goal, or a clear verdict; no wrong axis."""
 
 from dataclasses import replace
 
