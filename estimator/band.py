@@ -47,6 +47,11 @@ class ProfileBand:
         variance = np.einsum("ij,jk,ik->i", H, self.covariance, H)
         return H @ self.mean, np.sqrt(np.maximum(variance, 0.0))
 
+    def radii(self, z: Array) -> tuple[Array, Array]:
+        """Mean and joint covariance of the radii at heights z (m,) [m], [m^2]."""
+        H = self._rows(z)[0]
+        return H @ self.mean, np.asarray(H @ self.covariance @ H.T)
+
     def conditioned(self, told: ProfileReadings) -> ProfileBand:
         """The band after radii, slopes and second derivatives were read at some heights."""
         H = np.vstack(self._rows(told.z))

@@ -2,9 +2,11 @@
 
 Contacts before and after a placement of the hand are read apart, each with what was believed
 before any touch. Two axes of one object agree within their covariances, so the squared distance of
-the two in the chart is chi-square with four degrees of freedom; both share the prior and the
-sensor's offsets, which makes the test a cautious one. The fit of all contacts together is the other
-test: it sees what goes on within a placement, and less between them, where the profile gives way.
+the two in the chart is chi-square with four degrees of freedom. To that come the distances of the
+later contacts from the wall that the earlier ones led to expect, one more degree each; a shift of
+3 mm, which the first alone overlooks in one of three cases, is overlooked by both in one of eight.
+The fit of all contacts together is the other test: it sees what goes on within a placement, and
+less between two, where the profile gives way.
 
 What is done about it: earlier contacts count only as a belief, widened by the motion; and where
 contacts keep contradicting each other, each counts as worse placed by as much as the object moves.
@@ -24,9 +26,10 @@ from estimator.belief import Belief, update
 from estimator.contact import Contact, Miss
 from estimator.estimate import Hypothesis
 from estimator.prior import AxisPrior
-from estimator.vectors import Array, frozen
+from estimator.vectors import Array, basis_across, frozen
 
-ALARM = 0.01  # probability of a false alarm at a placement, by either test
+ALARM = 3e-3  # probability of a false alarm at a placement, by either test
+WALL = 0.7  # |n . u| beyond which a contact is not on the wall
 ONCE_BITTEN = 0.1  # the same after a first alarm, when the next placement has to agree
 MENTIONED = 0.01  # hypotheses that may be the right one
 RESTLESS = 3  # surprises from which the object counts as moving all the time
@@ -115,8 +118,26 @@ def motion_between(before: Belief, after: Belief, later: Sequence[Contact | Miss
     if not pairs:
         return None
     square, x = min(pairs, key=lambda pair: pair[0])
-    p_value = min(float(chi2.sf(square, 4)), after.estimate.p_value)
+    from_wall, count = _off_the_wall(before, contacts)
+    p_value = min(float(chi2.sf(square + from_wall, 4 + count)), after.estimate.p_value)
     return Motion(float(np.hypot(*x[:2])), float(np.hypot(*x[2:])), p_value)
+
+
+def _off_the_wall(before: Belief, contacts: Sequence[Contact]) -> tuple[float, int]:
+    """Squared distance of contacts from the expected wall in its deviations, and their number."""
+    u = before.axis.direction
+    on_wall = [c for c in contacts if abs(c.normal @ u) < WALL]
+    if not on_wall:
+        return 0.0, 0
+    p = np.array([c.position for c in on_wall])
+    _, rho, z = before.surface.cylindrical(p)
+    mean, covariance = before.band.radii(z)
+    out = (p - before.axis.foot(p)) / rho[:, None]
+    across = -out @ basis_across(u).T
+    J = np.hstack([across, across * z[:, None]])
+    noise = np.diag([c.noise.position**2 for c in on_wall])
+    total = covariance + J @ before.covariance @ J.T + noise
+    return float((rho - mean) @ np.linalg.solve(total, rho - mean)), len(on_wall)
 
 
 def _untouched(belief: Belief) -> Belief:
