@@ -41,6 +41,8 @@ def print_round(console: Console, step: Step, number: int) -> None:
             f"  worst case of the best pair {np.rad2deg(plan.bound.angle):.1f} deg, margin "
             f"{plan.margin:.2f} from: {plan.nearest}"
         )
+    if step.surprise is not None:
+        console.print(f"  [bold yellow]Surprise[/]: {step.surprise}")
     estimate = step.after.estimate
     if estimate is not None:
         console.print(

@@ -201,7 +201,8 @@ def _conclude(
     console: Console, scenario: Scenario, options: Options, steps: list[Step], reason: str
 ) -> int:
     belief = steps[-1].after if steps else scenario.belief
-    met = scenario.goal.met_by(belief)
+    unconfirmed = steps[-1].surprise if steps else None
+    met = scenario.goal.met_by(belief) and unconfirmed is None
     truth = scenario.surface.axis
     middle = _middle(scenario.surface)
     error = {
@@ -212,7 +213,8 @@ def _conclude(
         f"\n[bold]Estimate against truth[/] after {steps[-1].touches if steps else 0} touches: "
         f"{error['angle_deg']:.2f} deg, {error['offset_mm']:.2f} mm off"
     )
-    reason = "" if met else reason or f"budget spent: {scenario.goal.missing(belief)}"
+    missing = scenario.goal.missing(belief) or unconfirmed
+    reason = "" if met else reason or f"budget spent: {missing}"
     result = {
         "goal_met": met,
         "reason": reason,
