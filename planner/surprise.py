@@ -135,7 +135,7 @@ def _off_the_wall(before: Belief, contacts: Sequence[Contact]) -> tuple[float, i
     out = (p - before.axis.foot(p)) / rho[:, None]
     across = -out @ basis_across(u).T
     J = np.hstack([across, across * z[:, None]])
-    noise = np.diag([c.noise.position**2 for c in on_wall])
+    noise = np.diag([c.noise.position**2 + c.noise.position_bias**2 for c in on_wall])
     total = covariance + J @ before.covariance @ J.T + noise
     return float((rho - mean) @ np.linalg.solve(total, rho - mean)), len(on_wall)
 
