@@ -47,7 +47,7 @@ def planned(belief, *, seed=0, **more):
 @pytest.fixture(scope="module")
 def ambiguous():
     """Two equal heights on a can, curvatures hardly felt, little believed: two axes fit."""
-    belief = touched(TWO_EQUAL_HEIGHTS, noise=VAGUE, angle=2.3, offset=0.3, radius_sd=0.3)
+    belief = touched(TWO_EQUAL_HEIGHTS, noise=VAGUE, angle=2.3, offset=0.05)
     assert belief.estimate.verdict == "ambiguous"
     return belief
 

@@ -1,0 +1,99 @@
+"""Whether an object moved is told from its contacts, and what is believed then."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimator.axis import Axis, to_chart
+from estimator.belief import update
+from estimator.contact import Miss
+from estimator.surface import SurfaceOfRevolution
+from planner.surprise import ALARM, Learnt, learn, motion_between
+from sim_sensor.camera import coarse_view
+from sim_sensor.noise import simulated_sensor
+from sim_sensor.objects import load_object
+
+RUNS = 30
+
+
+class Scene:
+    """A can, believed coarsely, and three contacts that wrap around it, as often as asked."""
+
+    def __init__(self, seed, name="can"):
+        self.rng = np.random.default_rng([seed, 2])
+        self.profile = load_object(name)
+        self.axis = Axis([0.5, 0.0, 0.2], self.rng.normal(size=3))
+        surface = SurfaceOfRevolution(self.axis, self.profile)
+        self.belief = coarse_view(surface, angle=0.26, offset=0.015, rng=self.rng)
+        self.session = simulated_sensor("gel").session(rng=self.rng)
+
+    def touched(self, shift=0.0):
+        """Contacts with the object that far from where it was, in a random direction."""
+        way = self.rng.normal(size=3)
+        now = Axis(self.axis.point + shift * way / np.linalg.norm(way), self.axis.direction)
+        surface = SurfaceOfRevolution(now, self.profile)
+        reach = 0.35 * np.ptp(self.profile.z_range) * self.rng.uniform(0.5, 1.0)
+        z = self.rng.permutation([-reach, 0.0, reach])
+        theta = self.rng.uniform(0.0, 6.0) + 2.09 * np.arange(3) + 0.3 * self.rng.normal(size=3)
+        places = [surface.at(np.array(t), np.array(h)) for t, h in zip(theta, z, strict=True)]
+        return [self.session.read(place, rng=self.rng) for place in places], now
+
+
+def p_value(seed, shift):
+    scene = Scene(seed)
+    before = update(scene.belief, scene.touched()[0])
+    later = scene.touched(shift)[0]
+    return motion_between(before, update(before, later), later).p_value
+
+
+def test_an_object_at_rest_seldom_seems_to_move():
+    """30 sessions; 5 % were measured over 160, and 5 or more here would come once in 60."""
+    assert sum(p_value(seed, 0.0) < ALARM for seed in range(RUNS)) <= 4
+
+
+def test_a_shift_of_3_mm_seldom_goes_unseen():
+    """30 sessions; nine in ten are seen."""
+    assert sum(p_value(seed, 3e-3) < ALARM for seed in range(RUNS)) >= 23
+
+
+def test_what_was_learnt_of_an_object_that_moved_holds_where_it_is_now():
+    scene = Scene(0)
+    known = learn(Learnt(scene.belief), scene.touched()[0])
+    assert known.settled
+    assert known.surprise is None
+    later, now = scene.touched(10e-3)
+    moved = learn(known, later)
+    assert "the object moved, or a reading is wrong" in moved.surprise
+    assert not moved.settled
+    assert len(moved.belief.contacts) == 3
+    x = to_chart(moved.belief.axis, now)
+    assert x @ np.linalg.solve(moved.belief.covariance, x) < 24.5
+
+
+def test_a_miss_confirms_nothing():
+    scene = Scene(0)
+    known = learn(Learnt(scene.belief), scene.touched()[0])
+    moved = learn(known, scene.touched(10e-3)[0])
+    over = Miss(scene.axis.point + 0.2 * scene.axis.direction, 0.012)
+    assert not learn(moved, [over]).settled
+
+
+def test_contacts_of_what_never_rests_count_as_worse_placed():
+    scene = Scene(1)
+    known = Learnt(scene.belief)
+    for k in range(5):
+        known = learn(known, scene.touched(12e-3 * (k > 0))[0])
+    assert known.surprises >= 2
+    if known.restless == 0.0:
+        known = learn(replace(known, surprises=2), scene.touched(20e-3)[0])
+    assert known.restless >= 3e-3
+    assert all(c.noise.position >= known.restless for c in known.belief.contacts[-3:])
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_fewer_than_two_contacts_say_nothing_of_motion(count):
+    scene = Scene(2)
+    first, later = scene.touched()[0][:count], scene.touched(20e-3)[0]
+    before = update(scene.belief, first)
+    assert motion_between(before, update(before, later), later) is None
