@@ -9,6 +9,7 @@ earlier ones widen the belief (`planner.surprise`), and others have to agree bef
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,6 +22,8 @@ from planner.next_touch import next_touch
 from planner.options import PlannerOptions
 from planner.plan import NoPlan, Plan, Probe, plan_probes
 from planner.surprise import Learnt, learn
+
+TELLING_TRIES = 6  # best single touches that are handed to the optimiser
 
 Touch = Callable[[Probe], Contact | Miss]
 
@@ -71,7 +74,12 @@ def explore(
     learnt, touches = Learnt(belief), 0
     while touches < budget and not (goal.met_by(learnt.belief) and learnt.settled):
         before = learnt.belief
-        plan = _plan(hand, before, sensor, goal, budget - touches, rng, options)
+        try:
+            plan = _plan(hand, before, sensor, goal, budget - touches, rng, options)
+        except NoPlan:
+            if goal.met_by(before):
+                return  # nothing to confirm it with is within reach
+            raise
         outcomes = tuple(touch(probe) for probe in plan.probes)
         touches += len(outcomes)
         learnt = learn(learnt, outcomes)
@@ -88,11 +96,12 @@ def _plan(
     options: PlannerOptions,
 ) -> Plan:
     """One touch to tell the axes apart or to confirm the only one, a placement otherwise."""
-    if (_ambiguous(belief) or goal.met_by(belief)) and options.criterion == "information":
-        try:
-            return next_touch(hand, belief, sensor, goal=goal, rng=rng, options=options)
-        except NoPlan:
-            pass
+    few = replace(options, tries=min(options.tries, TELLING_TRIES))
+    if goal.met_by(belief):
+        return next_touch(hand, belief, sensor, goal=goal, rng=rng, options=few)
+    if _ambiguous(belief) and options.criterion == "information":
+        with suppress(NoPlan):
+            return next_touch(hand, belief, sensor, goal=goal, rng=rng, options=few)
     at_once = min(options.fingers_at_once, left)
     margin = options.margin if _fresh(belief) else 0.0
     this_time = replace(options, fingers_at_once=at_once, margin=margin)
