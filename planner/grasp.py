@@ -18,7 +18,7 @@ from hand_models.postures import Postures, posture_library
 from hand_models.spheres import LinkSpheres, link_spheres
 from planner.candidates import Candidates, placement_candidates
 from planner.closing import Bodies, bodies_of, body_of
-from planner.grasp_hold import Closings, Friction, holds
+from planner.grasp_hold import CLOSED, Closings, Friction, holds
 from planner.grasp_motion import BEFORE, closing_fault, closing_path, way_in
 from planner.grasp_outcome import Funnel, Grasp, Hold, NoGrasp, closes_on, hold_on
 from planner.motion import Approach, plan_approaches
@@ -203,9 +203,14 @@ def _with_fingers(
         return [], laid.rejected
     closings = _closings(tools.hand, surface, laid, options.reach)
     believed = holds(body_of(surface), closings, options.friction).gauge[0]
+    free = np.array([tools.collision.is_self_free(q) for q in laid.q])
     order = np.argsort(-believed, kind="stable")
-    best = order[believed[order] > 0.0][: options.shortlist]
-    funnel = (*laid.rejected, ("no force closure as believed", int(np.sum(believed <= 0.0))))
+    best = order[(believed[order] > CLOSED) & free[order]][: options.shortlist]
+    funnel = (
+        *laid.rejected,
+        ("no force closure as believed", int(np.sum(believed <= CLOSED))),
+        ("links overlap", int(np.sum(~free & (believed > CLOSED)))),
+    )
     if len(best) == 0:
         return [], funnel
     over = holds(bodies, closings.take(best), options.friction)
@@ -250,9 +255,7 @@ def _solid(surface: SurfaceOfRevolution) -> RevolvedSolid:
     return RevolvedSolid(X_WO, z, surface.profile.derivatives(z)[0])
 
 
-def _made(
-    tools: _Tools, solid: RevolvedSolid, one: _Ranked, options: GraspOptions
-) -> _Made | str:
+def _made(tools: _Tools, solid: RevolvedSolid, one: _Ranked, options: GraspOptions) -> _Made | str:
     """The candidate made exact, or the reason why it cannot be."""
     reach = tools.solver.solve(
         one.closing.points[0],

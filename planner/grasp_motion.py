@@ -10,6 +10,7 @@ from hand_models.batch import batch_placements
 from hand_models.collision import HandCollision
 from hand_models.hand import Hand
 from hand_models.spheres import LinkSpheres
+from planner.grasp_outcome import Grasp
 from planner.motion import Approach
 from planner.reach import Reach
 from planner.reach_task import ReachOptions
@@ -35,6 +36,23 @@ def closing_path(hand: Hand, reach: Reach, approaches: tuple[Approach, ...]) -> 
         for j in joints:
             path[:, j] = np.interp(at, np.arange(last + 1), approach.path[:, j])
     return frozen(path)
+
+
+def closed_posture(hand: Hand, grasp: Grasp, travel: Array) -> Array:
+    """Joint positions when each finger has stopped, (nq,) [rad].
+
+    Args:
+        travel: Of each finger beyond its planned contact, negative before it, (m,) [m].
+    """
+    q, rows = grasp.q_pregrasp.copy(), np.arange(len(grasp.path))
+    before, behind = grasp.closings.before[0], grasp.closings.behind[0]
+    last = len(rows) - 1
+    for j, name in enumerate(grasp.fingers):
+        ways, at = [-before[j], 0.0, behind[j]], [0.0, grasp.contact_index, last]
+        row = np.interp(travel[j], ways, at)
+        for i in hand.finger(name).q_indices:
+            q[i] = np.interp(row, rows, grasp.path[:, i])
+    return q
 
 
 def closing_fault(
