@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
 import pinocchio as pin
 
 from estimator.surface import SurfaceOfRevolution
@@ -83,12 +84,12 @@ class Grasp:
     @property
     def points(self) -> Array:
         """Planned contacts, (m, 3) [m]."""
-        return self.closings.points[0]
+        return np.asarray(self.closings.points[0])
 
     @property
     def normals(self) -> Array:
         """Outward normals there, (m, 3)."""
-        return self.closings.normals[0]
+        return np.asarray(self.closings.normals[0])
 
 
 class NoGrasp(Exception):

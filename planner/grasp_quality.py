@@ -140,8 +140,8 @@ def _newton(
 ) -> tuple[Array, Array, Array]:
     """One Newton step: A db = primal, A'dy + ds = dual, s db + b ds = product."""
     right = primal - _times(A, (product - b * dual) / s)
-    dy = np.linalg.solve(K, right[..., None])[..., 0]
-    ds = dual - _times(At, dy)
+    dy: Array = np.asarray(np.linalg.solve(K, right[..., None])[..., 0], dtype=np.float64)
+    ds: Array = dual - _times(At, dy)
     return (product - b * ds) / s, dy, ds
 
 

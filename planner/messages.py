@@ -1,7 +1,7 @@
 """Plans and steps as JSON: SI, radians, joint names, poses as position and quaternion (x, y, z, w).
 
 plan.json holds {"hand", "joint_names", "rounds": [plan, ...]}; the fields of a plan and of its
-probes are those of `plan_record` and `probe_record` below.
+probes are those of `plan_record` and `probe_record` below, those of a grasp of `grasp_record`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,9 @@ from estimator.contact import Contact, Miss
 from estimator.records import axis_record, contact_record, estimate_record
 from hand_models.hand import Hand
 from planner.explore import Step
+from planner.grasp_outcome import Grasp
 from planner.plan import Plan, Probe
+from planner.reach import Reach
 
 
 def plan_document(hand: Hand, plans: list[Plan]) -> dict[str, Any]:
@@ -35,14 +37,7 @@ def plan_record(plan: Plan) -> dict[str, Any]:
         "base_pose": pose_record(reach.X_WB),
         "joint_positions": reach.q.tolist(),
         "probes": [probe_record(probe) for probe in plan.probes],
-        "reach": {
-            "position_residual": reach.position_residual,
-            "pad_angle": reach.pad_angle,
-            "joint_limit_margin": reach.limit_margin,
-            "self_clearance": reach.self_clearance,
-            "object_clearance": reach.object_clearance,
-            "solver": reach.solver,
-        },
+        "reach": reach_record(reach),
         "bound": {"angle": _finite(plan.bound.angle), "position": _finite(plan.bound.position)},
         "expected_error": {"angle": _finite(plan.angle), "offset": _finite(plan.offset)},
         "predicted_covariance": plan.covariance.tolist(),
@@ -50,6 +45,52 @@ def plan_record(plan: Plan) -> dict[str, Any]:
         "nearest_singularity": plan.nearest,
         "label_probability": _finite(plan.label_probability),
         "funnel": [{"reason": reason, "count": count} for reason, count in plan.funnel],
+    }
+
+
+def grasp_record(hand: Hand, grasp: Grasp) -> dict[str, Any]:
+    """A grasp: the way in, joint angles open and closed, contacts, and how surely it holds."""
+    return {
+        "hand": hand.name,
+        "joint_names": list(hand.joint_names),
+        "fingers": list(grasp.fingers),
+        "base_pose": pose_record(grasp.X_WB),
+        "approach": [pose_record(X) for X in grasp.approach],
+        "pregrasp_joint_positions": grasp.q_pregrasp.tolist(),
+        "joint_positions": grasp.q_grasp.tolist(),
+        "closing": {
+            "joint_path": grasp.path.tolist(),
+            "contact_index": grasp.contact_index,
+            "before": grasp.closings.before[0].tolist(),
+            "behind": grasp.closings.behind[0].tolist(),
+        },
+        "contacts": [
+            {"finger": finger, "position": p.tolist(), "normal": n.tolist()}
+            for finger, p, n in zip(grasp.fingers, grasp.points, grasp.normals, strict=True)
+        ],
+        "quality": {
+            "force_closure_probability": grasp.probability,
+            "samples": grasp.samples,
+            "expected_wrench_margin": grasp.margin,
+            "wrench_margin_5_percent": grasp.margin_5,
+            "wrench_margin_as_believed": grasp.as_believed.margin,
+            "friction": grasp.friction.coefficient,
+            "torque_length": grasp.friction.torque_length,
+        },
+        "reach": reach_record(grasp.reach),
+        "funnel": [{"reason": reason, "count": count} for reason, count in grasp.funnel],
+    }
+
+
+def reach_record(reach: Reach) -> dict[str, Any]:
+    """The certificate of a posture."""
+    return {
+        "position_residual": reach.position_residual,
+        "pad_angle": reach.pad_angle,
+        "joint_limit_margin": reach.limit_margin,
+        "self_clearance": reach.self_clearance,
+        "object_clearance": reach.object_clearance,
+        "solver": reach.solver,
     }
 
 
