@@ -26,6 +26,7 @@ from estimator.vectors import Array, Mask, basis_across, cross
 
 EDGES = 8
 _FLAT = 1e-7  # a hull this thin, in units of its largest extent, spans no ball
+_ROUNDOFF = 1e-7  # of qhull's joggled faces: origins on the boundary are not inside
 _STEPS = 40  # of the interior-point method; a dozen do
 _CONVERGED = 1e-9
 _BACK = 0.99  # share of the way to the boundary
@@ -101,7 +102,8 @@ def ferrari_canny(wrenches: Array) -> float:
         hull = ConvexHull(wrenches, qhull_options="QJ")  # joggled: faces through many points
     except QhullError:  # as flat as roundoff lets it be
         return 0.0
-    return float(max(0.0, -np.max(hull.equations[:, -1])))
+    margin = -float(np.max(hull.equations[:, -1]))
+    return margin if margin > _ROUNDOFF else 0.0
 
 
 def has_force_closure(wrenches: Array, *, least: float = 1e-6) -> Mask:
@@ -115,24 +117,35 @@ def _least_sum(A: Array, c: Array) -> Array:
     y = 0 with slacks s = 1 is feasible for the dual  max c'y, A'y + s = 1, s >= 0.
     """
     n = A.shape[2]
-    scale = np.linalg.norm(A, axis=(1, 2))[:, None]
-    A, c = A / scale[..., None] * np.sqrt(n), c / scale * np.sqrt(n)
-    At = np.swapaxes(A, 1, 2)
+    scale = np.linalg.norm(A, axis=(1, 2))[:, None] / np.sqrt(n)
+    A, c = A / scale[..., None], c / scale
     b, y, s = np.ones((len(A), n)), np.zeros(c.shape), np.ones((len(A), n))
+    found, live = np.full(len(A), np.inf), np.arange(len(A))
     for _ in range(_STEPS):
-        gap = np.sum(b * s, axis=1)
-        primal = c - _times(A, b)
-        if np.all(gap < _CONVERGED * n) and np.max(np.abs(primal)) < 1e-8:
+        gap, primal = np.sum(b * s, axis=1), c - _times(A, b)
+        found[live] = np.sum(c * y, axis=1)
+        going = (gap > _CONVERGED * n) | (np.abs(primal).max(axis=1) > 1e-8)
+        if not going.any():
             break
-        dual = 1.0 - s - _times(At, y)
-        K = (A * (b / s)[:, None]) @ At + 1e-14 * np.eye(6)
-        db, _, ds = _newton(A, At, K, b, s, primal, dual, -b * s)
-        mu, aim = gap / n, np.sum(_kept(b, db) * _kept(s, ds), axis=1) / n
-        centring = (mu * (aim / mu) ** 3)[:, None]
-        db, dy, ds = _newton(A, At, K, b, s, primal, dual, centring - b * s - db * ds)
-        b, far = _kept(b, db), _reach(s, ds)[:, None]
-        y, s = y + far * dy, s + far * ds
-    return np.asarray(np.sum(c * y, axis=1))
+        live, A, c, b, y, s = (x[going] for x in (live, A, c, b, y, s))
+        step = _predicted_and_corrected(A, b, y, s, primal[going])
+        b, far = _kept(b, step[0]), _reach(s, step[2])[:, None]
+        y, s = y + far * step[1], s + far * step[2]
+    return found
+
+
+def _predicted_and_corrected(
+    A: Array, b: Array, y: Array, s: Array, primal: Array
+) -> tuple[Array, Array, Array]:
+    """Mehrotra's step: straight at the solution, then centred by how far that would go."""
+    n, At = A.shape[2], np.swapaxes(A, 1, 2)
+    dual = 1.0 - s - _times(At, y)
+    K = (A * (b / s)[:, None]) @ At
+    K += 1e-13 * np.trace(K, axis1=1, axis2=2)[:, None, None] * np.eye(6)
+    db, _, ds = _newton(A, At, K, b, s, primal, dual, -b * s)
+    mu, aim = np.mean(b * s, axis=1), np.sum(_kept(b, db) * _kept(s, ds), axis=1) / n
+    centring = (mu * (aim / mu) ** 3)[:, None]
+    return _newton(A, At, K, b, s, primal, dual, centring - b * s - db * ds)
 
 
 def _newton(
