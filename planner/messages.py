@@ -1,7 +1,8 @@
 """Plans and steps as JSON: SI, radians, joint names, poses as position and quaternion (x, y, z, w).
 
-plan.json holds {"hand", "joint_names", "rounds": [plan, ...]}; the fields of a plan and of its
-probes are those of `plan_record` and `probe_record` below, those of a grasp of `grasp_record`.
+plan.json holds {"hand", "joint_names", "rounds": [plan, ...], "grasp": grasp or null}; the fields
+of a plan and of its probes are those of `plan_record` and `probe_record` below, those of a grasp
+of `grasp_record`.
 """
 
 from __future__ import annotations
@@ -20,13 +21,14 @@ from planner.plan import Plan, Probe
 from planner.reach import Reach
 
 
-def plan_document(hand: Hand, plans: list[Plan]) -> dict[str, Any]:
-    """All placements that were planned, in order."""
+def plan_document(hand: Hand, plans: list[Plan], grasp: Grasp | None = None) -> dict[str, Any]:
+    """All placements that were planned, in order, and the grasp at the end, if there is one."""
     return {
         "hand": hand.name,
         "joint_names": list(hand.joint_names),
         "units": {"length": "m", "angle": "rad"},
         "rounds": [plan_record(plan) for plan in plans],
+        "grasp": None if grasp is None else grasp_record(hand, grasp),
     }
 
 
