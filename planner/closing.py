@@ -41,6 +41,18 @@ class Bodies:
     def __len__(self) -> int:
         return len(self.points)
 
+    def signed_distance(self, points_W: Array) -> Array:
+        """First-order distance of points (M, 3) to each solid, negative inside, (B, M) [m]."""
+        q = points_W - self.points[:, None]
+        z = np.einsum("bmi,bi->bm", q, self.directions)
+        rho = np.linalg.norm(q - z[..., None] * self.directions[:, None], axis=-1)
+        low, high = self.z_range
+        r, dr, _ = self.derivatives(np.clip(z, low, high))
+        cap = np.maximum(low - z, z - high)
+        corner = np.hypot(np.maximum(rho - r, 0.0), np.maximum(cap, 0.0))
+        wall = np.maximum((rho - r) / np.sqrt(1.0 + dr**2), cap)
+        return np.asarray(np.where(cap > 0.0, corner, wall))
+
 
 def body_of(surface: SurfaceOfRevolution) -> Bodies:
     """One surface."""

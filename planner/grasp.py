@@ -19,7 +19,13 @@ from hand_models.spheres import LinkSpheres, link_spheres
 from planner.candidates import Candidates, placement_candidates
 from planner.closing import Bodies, bodies_of, body_of
 from planner.grasp_hold import CLOSED, Closings, Friction, holds
-from planner.grasp_motion import BEFORE, closing_fault, closing_path, way_in
+from planner.grasp_motion import (
+    BEFORE,
+    closing_fault,
+    closing_path,
+    standing_clear,
+    way_in,
+)
 from planner.grasp_options import GraspOptions
 from planner.grasp_outcome import Funnel, Grasp, Hold, NoGrasp, closes_on, hold_on
 from planner.motion import Approach, plan_approaches
@@ -62,7 +68,7 @@ def plan_grasp(
         if isinstance(made, _Made):
             funnel += tuple((f"out of reach: {reason}", n) for reason, n in failures.items())
             fresh = bodies_of(sample_objects(belief, options.stated, rng=rng))
-            return _grasp(made, fresh, belief.surface, options.friction, funnel)
+            return _grasp(tools, made, fresh, belief.surface, options.friction, funnel)
         failures[made] = failures.get(made, 0) + 1
     raise NoGrasp(funnel + tuple((f"out of reach: {r}", n) for r, n in failures.items()))
 
@@ -235,7 +241,12 @@ def _made(tools: _Tools, solid: RevolvedSolid, one: _Ranked, options: GraspOptio
 
 
 def _grasp(
-    made: _Made, fresh: Bodies, surface: SurfaceOfRevolution, friction: Friction, funnel: Funnel
+    tools: _Tools,
+    made: _Made,
+    fresh: Bodies,
+    surface: SurfaceOfRevolution,
+    friction: Friction,
+    funnel: Funnel,
 ) -> Grasp:
     reach, approaches = made.reach, made.approaches
     closings = Closings(
@@ -247,6 +258,7 @@ def _grasp(
     )
     over = holds(fresh, closings, friction)
     margins = over.margins()
+    clear = standing_clear(tools.hand, tools.spheres, fresh, reach.q_standoff, reach.X_WB)
     return Grasp(
         fingers=reach.fingers,
         X_WB=reach.X_WB,
@@ -258,6 +270,7 @@ def _grasp(
         closings=closings,
         friction=friction,
         probability=float(over.probability[0]),
+        clear=float(clear.mean()),
         samples=len(fresh),
         margin=float(margins.mean()),
         margin_5=float(np.quantile(margins, 0.05)),

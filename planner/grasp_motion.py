@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from estimator.vectors import Array, frozen, unit
+from estimator.vectors import Array, Mask, frozen, unit
 from hand_models.batch import batch_placements
 from hand_models.collision import HandCollision
 from hand_models.hand import Hand
 from hand_models.spheres import LinkSpheres
+from planner.candidates import INTRUSION
+from planner.closing import Bodies
 from planner.grasp_outcome import Grasp
 from planner.motion import Approach
 from planner.reach import Reach
@@ -102,6 +104,15 @@ def way_in(
         if all(_clear(collision, reach.q_standoff, X, solid, options.clearance) for X in bases):
             return (*bases, reach.X_WB)
     return None
+
+
+def standing_clear(
+    hand: Hand, spheres: LinkSpheres, bodies: Bodies, q: Array, X_WB: pin.SE3
+) -> Mask:
+    """Whether the hand in a posture is outside each body, by its spheres, (B,)."""
+    local = spheres.positions(batch_placements(hand, q[None]))[0]
+    world = local @ X_WB.rotation.T + X_WB.translation
+    return np.asarray(np.all(bodies.signed_distance(world) - spheres.radii > -INTRUSION, axis=1))
 
 
 def _directions(base: Array, X_WO: pin.SE3) -> Array:

@@ -56,6 +56,7 @@ class Grasp:
         closings: The contacts, and the straight ways of the pads through them (one closing).
         friction: What was assumed of it.
         probability: Of force closure, over objects drawn from the belief for this alone.
+        clear: Share of the same objects that the open hand stands clear of.
         samples: How many objects that were.
         margin, margin_5: Mean and 5 % quantile over them of the smallest wrench that breaks the
             grasp, per newton of squeeze; torques on the arm `friction.torque_length` [N / N].
@@ -74,6 +75,7 @@ class Grasp:
     closings: Closings
     friction: Friction
     probability: float
+    clear: float
     samples: int
     margin: float
     margin_5: float

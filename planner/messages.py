@@ -72,6 +72,7 @@ def grasp_record(hand: Hand, grasp: Grasp) -> dict[str, Any]:
         ],
         "quality": {
             "force_closure_probability": grasp.probability,
+            "clear_probability": grasp.clear,
             "samples": grasp.samples,
             "expected_wrench_margin": grasp.margin,
             "wrench_margin_5_percent": grasp.margin_5,

@@ -1,6 +1,7 @@
 """Grasps hold the true object where the axis is known, and say how surely where it is not."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pinocchio as pin
@@ -45,7 +46,13 @@ def belief_of(name, angle_deg, offset, radius_sd):
     return replace(belief, band=band)
 
 
-def planned(name, *, tight=True, options=OPTIONS, seed=0):
+@cache
+def planned(name, *, tight=True):
+    """Planned once for all tests that only look."""
+    return planned_anew(name, tight=tight)
+
+
+def planned_anew(name, *, tight=True, options=OPTIONS, seed=0):
     belief = belief_of(name, 1.0, 0.5e-3, 0.3e-3) if tight else belief_of(name, 15, 0.015, 5e-3)
     return plan_grasp(HAND, belief, rng=np.random.default_rng(seed), options=options), belief
 
@@ -108,7 +115,7 @@ def test_the_stated_probability_is_that_of_the_belief():
     sure, _ = planned("can")
     assert grasp.probability < sure.probability
     assert grasp.margin < sure.margin
-    drawn = sample_objects(belief, 120, rng=np.random.default_rng(99))
+    drawn = sample_objects(belief, 80, rng=np.random.default_rng(99))
     held = [
         margin_in_world(
             grasp,
@@ -117,9 +124,9 @@ def test_the_stated_probability_is_that_of_the_belief():
             ),
         )
         > 1e-6
-        for b in range(120)
+        for b in range(80)
     ]
-    sd = np.sqrt(0.25 / 120 + 0.25 / grasp.samples)  # at most, of the difference of two shares
+    sd = np.sqrt(0.25 / 80 + 0.25 / grasp.samples)  # at most, of the difference of two shares
     assert abs(np.mean(held) - grasp.probability) < 3.0 * sd
 
 
@@ -144,6 +151,25 @@ def test_the_postures_of_a_grasp_hold_against_pinocchio_and_coal():
         assert min(near.distances.min(), near.pads.min()) > 0.0
     for q in grasp.path[: grasp.contact_index + 1]:
         assert collision.is_self_free(q)
+
+
+def test_the_open_hand_is_clear_as_often_as_coal_finds():
+    """Spheres against hulls: they agree but where a link is within the spheres' slack."""
+    grasp, belief = planned("can", tight=False)
+    sure, _ = planned("can")
+    assert grasp.clear < sure.clear
+    assert sure.clear > 0.97
+    drawn, collision = sample_objects(belief, 50, rng=np.random.default_rng(5)), HandCollision(HAND)
+    clear = []
+    for b in range(50):
+        surface = SurfaceOfRevolution(
+            Axis(drawn.points[b], drawn.directions[b]), SplineProfile(drawn.z, drawn.radii[b])
+        )
+        X_WO = pin.SE3(surface.frame.T.copy(), np.array(surface.axis.point))
+        solid = RevolvedSolid(X_WO, drawn.z, drawn.radii[b])
+        near = collision.object_clearance(grasp.q_pregrasp, grasp.X_WB, solid.slices, X_WO)
+        clear.append(min(near.distances.min(), near.pads.min()) > -2.5e-3)
+    assert abs(np.mean(clear) - grasp.clear) < 3.0 * np.sqrt(0.25 / 50 + 0.25 / grasp.samples)
 
 
 def test_fingers_stop_where_they_touch():
@@ -178,14 +204,14 @@ def test_pads_close_where_the_world_says_they_do(name):
 
 def test_the_user_bounds_the_height():
     options = replace(OPTIONS, heights=(-0.04, 0.0))
-    grasp, belief = planned("can", options=options)
+    grasp, belief = planned_anew("can", options=options)
     heights = belief.surface.cylindrical(grasp.points)[2]
     assert heights.min() >= -0.04
     assert heights.max() <= 0.0
 
 
 def test_four_fingers_hold_as_well():
-    grasp, belief = planned("can", options=replace(OPTIONS, fingers=(4,)))
+    grasp, belief = planned_anew("can", options=replace(OPTIONS, fingers=(4,)))
     assert len(set(grasp.fingers)) == 4
     assert margin_in_world(grasp, belief.surface) > 0.0
 
@@ -205,7 +231,7 @@ def test_an_object_out_of_reach_is_explained():
     reach = replace(OPTIONS.reach, workspace=Workspace(away, 0.01, 0.1))
     options = replace(OPTIONS, reach=reach, placements=100)
     with pytest.raises(NoGrasp, match="base outside its workspace") as caught:
-        planned("can", options=options)
+        planned_anew("can", options=options)
     assert "More friction" in str(caught.value)
     assert dict(caught.value.funnel)["3 fingers: placements laid"] == 100
 
@@ -214,11 +240,11 @@ def test_without_friction_nothing_of_revolution_is_held():
     """All normals meet the axis: nothing resists a turn about it."""
     options = replace(OPTIONS, friction=replace(OPTIONS.friction, coefficient=0.0), placements=100)
     with pytest.raises(NoGrasp, match="no force closure as believed"):
-        planned("can", options=options)
+        planned_anew("can", options=options)
 
 
 def test_same_seed_same_grasp():
-    first, second = (planned("can")[0] for _ in range(2))
+    first, second = (planned_anew("can")[0] for _ in range(2))
     np.testing.assert_array_equal(first.q_grasp, second.q_grasp)
     assert first.probability == second.probability
 
@@ -238,6 +264,6 @@ def test_bad_options_are_named(options, message):
 
 def test_heights_beside_the_object_and_fingers_it_has_not_are_refused():
     with pytest.raises(ValueError, match="the believed object is between"):
-        planned("can", options=replace(OPTIONS, heights=(0.5, 0.6)))
+        planned_anew("can", options=replace(OPTIONS, heights=(0.5, 0.6)))
     with pytest.raises(ValueError, match="allegro_right has 4, not 5"):
-        planned("can", options=replace(OPTIONS, fingers=(5,)))
+        planned_anew("can", options=replace(OPTIONS, fingers=(5,)))
