@@ -66,7 +66,8 @@ def print_ending(console: Console, end: Ending) -> None:
     console.print(_table(grasp, hold))
     console.print(
         f"  force closure in {100 * grasp.probability:.0f} % of {grasp.samples} objects drawn from "
-        f"the belief, friction {grasp.friction.coefficient:g}\n"
+        f"the belief, friction {grasp.friction.coefficient:g}; the open hand is clear of "
+        f"{100 * grasp.clear:.0f} %\n"
         f"  resists any wrench up to {grasp.margin:.3f} N for each newton of squeeze, "
         f"{grasp.margin_5:.3f} N in 95 % (torques on {1e3 * grasp.friction.torque_length:.0f} mm)\n"
         f"  on the true object: {_in_words(hold)}"
