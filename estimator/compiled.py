@@ -25,7 +25,7 @@ V3 = tuple[float, float, float]
 def _folder() -> Path:
     """Where code compiled from exactly these sources is kept."""
     digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.glob("*.py")):
+    for path in sorted(Path(__file__).parent.rglob("*.py")):
         digest.update(path.read_bytes())
     named = os.environ.get("AXIS_BY_TOUCH_CACHE")
     user = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "axis-by-touch"

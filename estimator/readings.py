@@ -154,7 +154,7 @@ def stacked_readings(
     out[..., K0:K1], out[..., K1:KAPPA] = k[..., 0, :], cross(n, k[..., 0, :])
     out[..., KAPPA:CENSORED], out[..., CENSORED:EDGE] = kappa, censored
     out[..., VOID], out[..., CONVEX] = void, unmeasured | convex
-    out[..., COVARIANCE:] = Sigma.reshape(*out.shape[:2], -1)
+    out[..., COVARIANCE:] = Sigma.reshape(*out.shape[:2], ERRORS**2)
     return out
 
 

@@ -25,8 +25,8 @@ SENSORS: dict[str, SensorNoise] = {
     "gel": SensorNoise(0.10e-3, 0.7 * _DEG, 0.0, 1.2, 1.7, 0.046, 3.0),
     "gel-good": SensorNoise(0.05e-3, 0.3 * _DEG, 0.0, 0.41, 0.58, 0.024, 1.0),
     "gel-poor": SensorNoise(0.20e-3, 1.4 * _DEG, 0.0, 4.1, 5.8, 0.108, 8.0),
-    # what raw signals are worth after reading (`estimator.raw_sensors`), measured at 3 N on cans,
-    # barrels and bottles
+    # what raw signals are worth after reading (`estimator.readers.raw_sensors`), measured at
+    # 3 N on cans, barrels and bottles
     "fearing-strain": SensorNoise(
         0.13e-3,
         0.57 * _DEG,

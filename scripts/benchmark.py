@@ -3,6 +3,7 @@
 Comparisons
     touches      contacts the planner chose against random contacts the same hand reaches
     loops        whole sessions to a goal, from raw signals and from readings with noise
+    readers      raw signals read, beside a straightforward implementation
     estimators   our estimator against others on the same contacts, accuracy and time as ratios
 
 The estimators compared
@@ -19,6 +20,7 @@ Exit status: 0 measured, 2 bad input.
 Examples:
     python scripts/benchmark.py touches --runs 20 --objects can bottle
     python scripts/benchmark.py loops --sensors gel-depth --runs 20 --jobs 4
+    python scripts/benchmark.py readers
     python scripts/benchmark.py estimators --runs 20
     python scripts/benchmark.py estimators --contacts 3 10 --sensors gel --out ratios.json
     python scripts/benchmark.py estimators --help
@@ -35,6 +37,7 @@ for library in ("OMP", "OPENBLAS", "MKL", "NUMBA"):  # one core; read when numpy
 
 import benchmark_estimators  # noqa: E402
 import benchmark_loops  # noqa: E402
+import benchmark_readers  # noqa: E402
 import benchmark_touches  # noqa: E402
 import tyro  # noqa: E402
 from tyro.conf import subcommand  # noqa: E402
@@ -43,6 +46,9 @@ Touches = Annotated[
     benchmark_touches.Options, subcommand("touches", description=benchmark_touches.__doc__)
 ]
 Loops = Annotated[benchmark_loops.Options, subcommand("loops", description=benchmark_loops.__doc__)]
+Readers = Annotated[
+    benchmark_readers.Options, subcommand("readers", description=benchmark_readers.__doc__)
+]
 Estimators = Annotated[
     benchmark_estimators.Options,
     subcommand("estimators", description=benchmark_estimators.__doc__),
@@ -50,12 +56,16 @@ Estimators = Annotated[
 
 
 def main() -> int:
-    options = tyro.cli(Touches | Loops | Estimators, description=__doc__)
-    if isinstance(options, benchmark_loops.Options):
-        return benchmark_loops.main(options)
-    if isinstance(options, benchmark_touches.Options):
-        return benchmark_touches.main(options)
-    return benchmark_estimators.main(options)
+    options = tyro.cli(Touches | Loops | Readers | Estimators, description=__doc__)
+    match options:
+        case benchmark_touches.Options():
+            return benchmark_touches.main(options)
+        case benchmark_loops.Options():
+            return benchmark_loops.main(options)
+        case benchmark_readers.Options():
+            return benchmark_readers.main(options)
+        case _:
+            return benchmark_estimators.main(options)
 
 
 if __name__ == "__main__":

@@ -29,7 +29,7 @@ from rich.table import Table
 from estimator.axis import Axis, angle_between, offset_at, to_chart
 from estimator.belief import Belief
 from estimator.contact import Contact, Miss
-from estimator.raw_sensors import RAW_SENSORS
+from estimator.readers.raw_sensors import RAW_SENSORS
 from estimator.sensors import sensor_noise
 from estimator.surface import SurfaceOfRevolution
 from hand_models import load_hand
@@ -58,6 +58,8 @@ class Options:
     budget: int = 15
     """Largest number of touches in a session."""
     hand: str = "allegro_right"
+    readings: bool = False
+    """Raw sensors as readings with the noise that is stated of them, not from signals."""
     jobs: int = 2
     """Sessions at the same time."""
     seed: int = 0
@@ -99,7 +101,10 @@ def main(options: Options) -> int:
     jobs = list(product(options.sensors, options.objects, seeds))
     ended: list[Session] = []
     with ProcessPoolExecutor(options.jobs) as pool:
-        futures = [pool.submit(run_session, options.hand, options.budget, *job) for job in jobs]
+        futures = [
+            pool.submit(run_session, options.hand, options.budget, options.readings, *job)
+            for job in jobs
+        ]
         for future in track(
             as_completed(futures), "sessions", len(jobs), console=console, transient=True
         ):
@@ -132,13 +137,15 @@ def _hand(name: str) -> Hand:
     return load_hand(name)
 
 
-def run_session(hand: str, budget: int, sensor: str, name: str, seed: int) -> Session:
+def run_session(
+    hand: str, budget: int, readings: bool, sensor: str, name: str, seed: int
+) -> Session:
     """One session from a coarse view."""
     rng = np.random.default_rng([seed, 11])
     upright = Axis([0.5, 0.0, 0.2], [0.2 * rng.normal(), 0.2 * rng.normal(), 1.0])
     surface = SurfaceOfRevolution(upright, load_object(name))
     belief = coarse_view(surface, angle=np.deg2rad(15.0), offset=0.015, rng=rng)
-    raw = sensor in RAW_SENSORS
+    raw = sensor in RAW_SENSORS and not readings
     mounted = raw_sense(sensor, surface, rng=rng) if raw else None
     world = World(surface, mounted or simulated_sensor(sensor).session(rng=rng), rng=rng)
     touches, why = 0, ""
@@ -193,7 +200,7 @@ def _ended(
 def _table(options: Options, sensor: str, ended: list[Session]) -> Table:
     title = f"{sensor}: sessions to 3 deg and 2 mm, at most {options.budget} touches"
     table = Table(title=title, box=SIMPLE_HEAD, pad_edge=False)
-    headings = ("object", "runs", "goal met", "touches", "median deg", "p90", "median mm", "p90",
+    headings = ("object", "runs", "goal met %", "touches", "median deg", "p90", "median mm", "p90",
                 "wrong")  # fmt: skip
     for heading in headings:
         table.add_column(heading, justify="left" if heading == "object" else "right", no_wrap=True)
@@ -219,8 +226,8 @@ def _row(chosen: list[Session]) -> list[str]:
 
 
 def _share(share: Interval) -> str:
-    return f"{100 * share.value:.0f} % [{100 * share.low:.0f}-{100 * share.high:.0f}]"
+    return f"{100 * share.value:.0f} [{100 * share.low:.0f}-{100 * share.high:.0f}]"
 
 
 def _figure(figure: Interval) -> str:
-    return f"{figure.value:.2f} [{figure.low:.1f}-{figure.high:.1f}]"
+    return f"{figure.value:.2f} ±{0.5 * (figure.high - figure.low):.2f}"

@@ -13,7 +13,8 @@ Curvatures are per unit, null where the sensor saturated (flatter than it resolv
 sensor may be left out; contacts that name the same one share its errors, which are estimated along.
 
 With --raw the file holds what the sensors reported, depth images or strains with the pose of the
-sensor at each touch (an .npz file; its layout stands in estimator/raw_files.py), and is read first.
+sensor at each touch (an .npz file; its layout stands in estimator/readers/raw_files.py), and is
+read first.
 
 Examples:
     python scripts/estimate_axis.py tests/data/table8.json
@@ -37,8 +38,8 @@ from estimator.assumptions import Assumptions
 from estimator.contact import Contact, SensorNoise
 from estimator.estimate import AxisEstimate
 from estimator.fusion import estimate_axis
-from estimator.raw_files import read_raw
-from estimator.raw_sensors import RAW_SENSORS, raw_sensor, read_touches
+from estimator.readers.raw_files import read_raw
+from estimator.readers.raw_sensors import RAW_SENSORS, raw_sensor, read_touches
 from estimator.records import estimate_record, read_contacts
 from estimator.sensors import sensor_noise
 

@@ -9,8 +9,8 @@ from rich.table import Table
 
 from estimator.belief import update
 from estimator.contact import Contact, Miss
-from estimator.raw_files import RawTouches
-from estimator.raw_sensors import DepthPad, raw_sensor
+from estimator.readers.raw_files import RawTouches
+from estimator.readers.raw_sensors import DepthPad, raw_sensor
 from estimator.surface import SurfaceOfRevolution
 from planner.explore import Step
 from planner.plan import Probe

@@ -8,8 +8,8 @@ from paper_experiments import INCH, Experiment
 from paper_page import Section, markdown_table, paragraphs
 from paper_sensor import DEPTH_MM, RADII, REPEATS, body
 
-from estimator.strain import read_strains
-from estimator.strain_array import StrainArray
+from estimator.readers.strain import read_strains
+from estimator.readers.strain_array import StrainArray
 from estimator.vectors import unit
 from sim_sensor.tactel_imperfections import StrainImperfections
 from sim_sensor.tactels import StrainFinger

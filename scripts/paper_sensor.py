@@ -14,10 +14,10 @@ from paper_experiments import INCH
 from paper_page import Section, Verdict, markdown_table, paragraphs
 from scipy.optimize import brentq
 
-from estimator.hertz import contact_ellipse
-from estimator.strain import read_strains
-from estimator.strain_array import StrainArray
-from estimator.strain_model import reading_slopes, touch_state
+from estimator.readers.hertz import contact_ellipse
+from estimator.readers.strain import read_strains
+from estimator.readers.strain_array import StrainArray
+from estimator.readers.strain_model import reading_slopes, touch_state
 from sim_sensor.tactels import StrainFinger
 
 Array = NDArray[np.float64]

@@ -36,8 +36,8 @@ from rich.console import Console
 from estimator.axis import Axis, angle_between, offset_at
 from estimator.belief import Belief
 from estimator.contact import Contact, Miss, SensorNoise
-from estimator.raw_files import write_raw
-from estimator.raw_sensors import RAW_SENSORS
+from estimator.readers.raw_files import write_raw
+from estimator.readers.raw_sensors import RAW_SENSORS
 from estimator.records import estimate_record
 from estimator.sensors import sensor_noise
 from estimator.surface import SurfaceOfRevolution

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from estimator.hertz import contact_ellipse, ellipse_curvatures, indentation
+from estimator.readers.hertz import contact_ellipse, ellipse_curvatures, indentation
 from estimator.vectors import Array, frozen
 from sim_sensor.gel_contact import free_surface, press_into
 from sim_sensor.gel_noise import depth_noise

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.special import elliprd, elliprf
 
 from estimator.compiled import compiled
-from estimator.depth_fit import dome
+from estimator.readers.depth_fit import dome
 from estimator.vectors import Array
 
 NODES = 21

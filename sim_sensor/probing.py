@@ -1,4 +1,4 @@
-"""A probing campaign on a simulated finger: what `estimator.response_fit` is fed.
+"""A probing campaign on a simulated finger: what `estimator.readers.response_fit` is fed.
 
 The paper's machine pressed a probe on the sensor every 0.02 inch along the axis and every 3 degrees
 around it, about 3500 times (appendix 7.2.1).
@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from estimator.probing import Probe, Probing
+from estimator.readers.probing import Probe, Probing
 from estimator.vectors import Array
 from sim_sensor.tactels import TactelSession
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from estimator.raw_sensors import DepthPad, RawSensor, raw_sensor
-from estimator.strain_array import StrainArray
+from estimator.readers.raw_sensors import DepthPad, RawSensor, raw_sensor
+from estimator.readers.strain_array import StrainArray
 from estimator.surface import Geometry, SurfaceOfRevolution
 from estimator.vectors import Array, basis_across, frozen, unit
 from sim_sensor.feeling import Felt, Touched
@@ -85,7 +85,7 @@ class GelSense:
 def raw_sense(
     name: str, surface: SurfaceOfRevolution, *, rng: np.random.Generator
 ) -> TactelSense | GelSense:
-    """Mount a raw sensor of `estimator.raw_sensors`: draw what stays the same for a session.
+    """Mount a sensor of `estimator.readers.raw_sensors`: draw what stays for a session.
 
     Raises:
         ValueError: Unknown name; the message lists the known ones.

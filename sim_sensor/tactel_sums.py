@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from estimator.compiled import compiled
-from estimator.disk_rule import disk_rule
-from estimator.response import POINT_LOAD, ResponseModel, response_at
+from estimator.readers.disk_rule import disk_rule
+from estimator.readers.response import POINT_LOAD, ResponseModel, response_at
 from estimator.vectors import Array, Index
 
 RULES = ((4, 14), (6, 22), (8, 28), (10, 34), (14, 42), (16, 64))  # rings and nodes on each

@@ -5,7 +5,7 @@ exact Hertz ellipse and its pressure on twice as many nodes, every tactel with i
 place, and all the imperfections the paper met (`StrainImperfections`). What nobody knows is drawn
 once a session; readings are then noisy and quantised as the `StrainArray` states.
 
-Frame S as in `estimator.strain_array`: x along the finger, y = r theta around it.
+Frame S as in `estimator.readers.strain_array`: x along the finger, y = r theta around it.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from estimator.hertz import contact_ellipse, indentation
-from estimator.response import POINT_LOAD, ResponseModel
-from estimator.response_models import altered
-from estimator.strain_array import StrainArray
+from estimator.readers.hertz import contact_ellipse, indentation
+from estimator.readers.response import POINT_LOAD, ResponseModel
+from estimator.readers.response_models import altered
+from estimator.readers.strain_array import StrainArray
 from estimator.vectors import Array, Mask, frozen
 from sim_sensor.tactel_imperfections import StrainImperfections
 from sim_sensor.tactel_sums import pressed_readings

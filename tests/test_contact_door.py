@@ -63,7 +63,7 @@ def test_saturated_curvatures_are_welcome():
 
 
 def test_a_contact_has_no_field_that_tells_the_directions_apart_and_cannot_be_changed():
-    assert {f.name for f in fields(Contact)} == {*GOOD, "finger", "sensor"}
+    assert {f.name for f in fields(Contact)} == {*GOOD, "finger", "sensor", "covariance"}
     source = np.array([0.1, 0.2, 0.3])
     contact = Contact(**{**GOOD, "position": source})
     source[0] = 9.0

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from estimator.depth import read_depth
-from estimator.depth_noise import DepthNoise, noise_of_frames
-from estimator.depth_normals import read_normals
+from estimator.readers.depth import read_depth
+from estimator.readers.depth_noise import DepthNoise, noise_of_frames
+from estimator.readers.depth_normals import read_normals
 from sim_sensor.gel import GelPad
 from sim_sensor.gel_shape import arc_patches
 

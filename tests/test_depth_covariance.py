@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from estimator.depth import read_depth
-from estimator.depth_noise import DepthNoise
+from estimator.local_surface import misplaced
+from estimator.readers.depth import read_depth
+from estimator.readers.depth_noise import DepthNoise
 from sim_sensor.gel import GelPad
 from sim_sensor.gel_shape import arc_patches
 
@@ -118,13 +119,7 @@ def test_a_pad_that_errs_beyond_its_stated_noise_widens_the_covariance():
 def test_session_errors_are_covered_when_they_are_told():
     """A real pad: bonded layer, gain, offset, misplaced; one reading from each of 300 sessions."""
     pad = GelPad()
-    told = DepthNoise(
-        correlated=pad.correlated,
-        length=pad.length,
-        gain=pad.gain,
-        place=pad.misplaced,
-        alignment=pad.misturned,
-    )
+    told = DepthNoise(correlated=pad.correlated, length=pad.length, gain=pad.gain)
     rng = np.random.default_rng(5)
     K = np.array([[35.0, 8.0], [8.0, 12.0]])
     hits = []
@@ -132,7 +127,8 @@ def test_session_errors_are_covered_when_they_are_told():
         session = pad.session(rng=rng)
         touch = session.press(arc_patches(K), rng=rng, force=3.0)
         X = touch.X_WS[0]
-        local = read_depth(touch.depth, pad.pitch, noise=told).surface()
+        felt = read_depth(touch.depth, pad.pitch, noise=told).surface()
+        local = misplaced(felt, place=pad.misplaced, turn=pad.misturned)
         across = (X[:3, :3].T @ np.eye(3))[:, :2]  # the body's x and y in S
         rows = local.frame[:2] @ across
         error = (local.tensor - rows @ K @ rows.T)[[0, 1, 0], [0, 1, 1]]

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from estimator.axis import Axis
-from estimator.depth import read_depth
-from estimator.depth_cells import pool
-from estimator.depth_fit import fit_once, gather
-from estimator.depth_noise import DepthNoise, noise_of_frames
-from estimator.depth_normals import read_normals
-from estimator.depth_reading import covariance_into
 from estimator.profile import barrel, cylinder, spline_through
+from estimator.readers.depth import read_depth
+from estimator.readers.depth_cells import pool
+from estimator.readers.depth_fit import fit_once, gather
+from estimator.readers.depth_noise import DepthNoise, noise_of_frames
+from estimator.readers.depth_normals import read_normals
+from estimator.readers.depth_reading import covariance_into
 from estimator.surface import SurfaceOfRevolution
 from sim_sensor.gel import GelPad
 from sim_sensor.gel_noise import depth_noise

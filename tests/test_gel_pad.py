@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from estimator.axis import Axis
-from estimator.hertz import ellipse_curvatures, indentation
 from estimator.profile import barrel, cylinder, sphere
+from estimator.readers.hertz import ellipse_curvatures, indentation
 from estimator.surface import SurfaceOfRevolution
 from sim_sensor.gel import GelPad
 from sim_sensor.gel_contact import free_surface, outside

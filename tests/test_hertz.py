@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from estimator.hertz import (
+from estimator.readers.hertz import (
     contact_ellipse,
     curvature_into,
     curvature_tensor,

@@ -6,11 +6,11 @@ Medians over 200 touches at 1.5 N anywhere in one cell, two-curvature reader.
 import numpy as np
 import pytest
 
-from estimator.probing import Probe
-from estimator.response_fit import fit_response
-from estimator.response_models import boussinesq, separable
-from estimator.strain import read_strains
-from estimator.strain_array import StrainArray, taxel_array
+from estimator.readers.probing import Probe
+from estimator.readers.response_fit import fit_response
+from estimator.readers.response_models import boussinesq, separable
+from estimator.readers.strain import read_strains
+from estimator.readers.strain_array import StrainArray, taxel_array
 from sim_sensor.probing import Campaign, probe_finger
 from sim_sensor.tactel_imperfections import StrainImperfections
 from sim_sensor.tactels import StrainFinger

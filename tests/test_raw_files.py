@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from estimator.raw_files import RawTouches, read_raw, write_raw
+from estimator.readers.raw_files import RawTouches, read_raw, write_raw
 
 POSES = np.tile(np.eye(4), (3, 1, 1))
 
@@ -122,9 +122,11 @@ def test_bad_arrays_are_named(tmp_path, change, message):
     assert str(path) in str(caught.value)
 
 
-def test_strains_of_another_array_size_are_refused(tmp_path):
-    with pytest.raises(ValueError, match=r"strains: expected shape \(3, 4, 4\)"):
-        read_raw(saved(tmp_path, {**good_strains(), "strains": np.zeros((3, 4, 5))}))
+def test_strains_are_frames_of_an_array_of_any_size(tmp_path):
+    frames = {**good_strains(), "strains": np.zeros((3, 8, 5))}
+    assert read_raw(saved(tmp_path, frames)).strains.shape == (3, 8, 5)
+    with pytest.raises(ValueError, match=r"strains: expected shape \(3, any, any\), got \(3, 16\)"):
+        read_raw(saved(tmp_path, {**frames, "strains": np.zeros((3, 16))}))
 
 
 def test_pickled_objects_are_refused(tmp_path):

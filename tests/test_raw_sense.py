@@ -14,8 +14,8 @@ from scipy.stats import chi2
 
 from estimator.axis import Axis
 from estimator.contact import Contact, Miss
-from estimator.raw_files import RawTouches
-from estimator.raw_sensors import RAW_SENSORS, raw_sensor, read_touches
+from estimator.readers.raw_files import RawTouches
+from estimator.readers.raw_sensors import RAW_SENSORS, raw_sensor, read_touches
 from estimator.surface import Place, SurfaceOfRevolution
 from estimator.vectors import Array, cross
 from sim_sensor.feeling import Felt, Touched

@@ -6,12 +6,16 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from estimator.axis import Axis, angle_between
 from estimator.profile import cylinder
 from estimator.sensors import SENSORS
 from estimator.surface import SurfaceOfRevolution
+from sim_sensor.gel import GelPad
+from sim_sensor.gel_shape import arc_patches
 from sim_sensor.noise import simulated_sensor
+from sim_sensor.tactels import StrainFinger
 from sim_sensor.world import World
 
 ROOT = Path(__file__).parents[1]
@@ -33,6 +37,16 @@ def test_the_estimators_example_reads_a_record(capsys):
     record = json.loads((ROOT / "tests" / "data" / "table8.json").read_text())
     exec(BLOCKS[1], {"record": record})
     assert "determined" in capsys.readouterr().out
+
+
+def test_the_readers_example_reads_raw_signals():
+    rng, body = np.random.default_rng(1), np.diag([1 / 0.03, 1 / 0.2])
+    depth = GelPad().session(rng=rng).press(arc_patches(body[None]), rng=rng, force=3.0).depth
+    finger = StrainFinger().session(rng=rng)
+    names = {"depth": depth}
+    names["strains"] = finger.press([0.0, 0.0], [2.0], body[None], rng=rng).readings
+    exec(BLOCKS[2], names)
+    assert np.linalg.eigvalsh(names["surface"].tensor)[1] == pytest.approx(1 / 0.03, rel=0.3)
 
 
 def test_every_sensor_named_is_known():

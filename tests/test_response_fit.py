@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from estimator.probing import Probe, Probing
-from estimator.response_fit import fit_response
-from estimator.response_models import separable
-from estimator.strain_array import StrainArray
+from estimator.readers.probing import Probe, Probing
+from estimator.readers.response_fit import fit_response
+from estimator.readers.response_models import separable
+from estimator.readers.strain_array import StrainArray
 from sim_sensor.probing import Campaign, probe_finger
 from sim_sensor.tactel_imperfections import StrainImperfections
 from sim_sensor.tactels import StrainFinger

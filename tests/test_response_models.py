@@ -5,8 +5,8 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import least_squares
 
-from estimator.response import ResponseModel, response_at
-from estimator.response_models import boussinesq, pressure, separable, table, tangential
+from estimator.readers.response import ResponseModel, response_at
+from estimator.readers.response_models import boussinesq, pressure, separable, table, tangential
 
 HERE = np.zeros((1, 2))
 MM = 1e-3

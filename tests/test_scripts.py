@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimator.raw_files import read_raw
+from estimator.readers.raw_files import read_raw
 
 ROOT = Path(__file__).parents[1]
 DATA = ROOT / "tests" / "data"

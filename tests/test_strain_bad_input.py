@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from touches import FINGER, angle_error, in_cell, readings, touches
 
-from estimator.strain import read_strains
-from estimator.strain_array import StrainArray, taxel_array
-from estimator.strain_flags import (
+from estimator.readers.strain import read_strains
+from estimator.readers.strain_array import StrainArray, taxel_array
+from estimator.readers.strain_flags import (
     BEYOND,
     DEAD,
     EDGE,
@@ -22,8 +22,8 @@ from estimator.strain_flags import (
     TWO,
     UMBILIC,
 )  # fmt: skip
-from estimator.strain_model import predicted_readings, touch_state
-from estimator.strain_sensitivity import revolved_tensor
+from estimator.readers.strain_model import predicted_readings, touch_state
+from estimator.readers.strain_sensitivity import revolved_tensor
 
 N = 500
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from touches import FINGER, angle_error, in_cell, readings, tensor_coverage, touches
 
-from estimator.strain import read_strains
-from estimator.strain_covariance import ellipses_of
-from estimator.strain_flags import FLAGS, UMBILIC
-from estimator.strain_model import predicted_readings, touch_state
-from estimator.strain_sensitivity import revolved_tensor
+from estimator.readers.strain import read_strains
+from estimator.readers.strain_covariance import ellipses_of
+from estimator.readers.strain_flags import FLAGS, UMBILIC
+from estimator.readers.strain_model import predicted_readings, touch_state
+from estimator.readers.strain_sensitivity import revolved_tensor
 
 FLAT = np.array([0.0, 5.0, 10.0, 25.0])  # 1/m: flat to 40 mm
 

@@ -7,8 +7,8 @@ reader. Factors and shares are those of another code; they are medians or shares
 import numpy as np
 import pytest
 
-from estimator.strain import read_strains
-from estimator.strain_array import StrainArray
+from estimator.readers.strain import read_strains
+from estimator.readers.strain_array import StrainArray
 from sim_sensor.tactel_imperfections import StrainImperfections
 from sim_sensor.tactels import StrainFinger
 

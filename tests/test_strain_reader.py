@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from touches import FINGER, angle_error, in_cell, readings, touches
 
-from estimator.response_models import boussinesq, separable
-from estimator.strain import read_strains
-from estimator.strain_array import StrainArray, taxel_array
-from estimator.strain_covariance import ellipses_of
-from estimator.strain_model import predicted_readings, reading_slopes, touch_state
-from estimator.strain_sensitivity import revolved_tensor
+from estimator.readers.response_models import boussinesq, separable
+from estimator.readers.strain import read_strains
+from estimator.readers.strain_array import StrainArray, taxel_array
+from estimator.readers.strain_covariance import ellipses_of
+from estimator.readers.strain_model import predicted_readings, reading_slopes, touch_state
+from estimator.readers.strain_sensitivity import revolved_tensor
 
 PAPER = StrainArray(tactels=(4, 4))
 KNOWN = json.loads((Path(__file__).parent / "data" / "tactile_refs.json").read_text())["touches"]

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.strain_array import StrainArray
-from estimator.strain_model import predicted_readings, touch_state
-from estimator.strain_sensitivity import largest_errors, revolved_tensor
+from estimator.readers.strain_array import StrainArray
+from estimator.readers.strain_model import predicted_readings, touch_state
+from estimator.readers.strain_sensitivity import largest_errors, revolved_tensor
 
 PAPER = StrainArray(tactels=(4, 4), modulus=0.25e6, response_modulus=0.25e6, poisson=0.5)
 INCH = 25.4e-3

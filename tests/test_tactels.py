@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from estimator.hertz import contact_ellipse
-from estimator.response_models import separable
-from estimator.strain_array import StrainArray, taxel_array
+from estimator.readers.hertz import contact_ellipse
+from estimator.readers.response_models import separable
+from estimator.readers.strain_array import StrainArray, taxel_array
 from sim_sensor.tactel_imperfections import ORDINARY, StrainImperfections
 from sim_sensor.tactels import StrainFinger
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from estimator.strain_array import StrainArray
-from estimator.strain_covariance import ellipses_of
-from estimator.strain_model import predicted_readings, touch_state
-from estimator.strain_sensitivity import revolved_tensor
+from estimator.readers.strain_array import StrainArray
+from estimator.readers.strain_covariance import ellipses_of
+from estimator.readers.strain_model import predicted_readings, touch_state
+from estimator.readers.strain_sensitivity import revolved_tensor
 
 FINGER = StrainArray()
 

@@ -7,14 +7,14 @@ from typing import Literal
 
 import numpy as np
 
-from estimator.response import ResponseModel
-from estimator.strain_array import StrainArray
-from estimator.strain_covariance import body_tensors, flat_curvatures, inverse_information
-from estimator.strain_equations import Problem
-from estimator.strain_fit import MOST_STEPS, fit_all
-from estimator.strain_flags import POOR_FIT
-from estimator.strain_start import starts
-from estimator.strain_window import Windows
+from estimator.readers.response import ResponseModel
+from estimator.readers.strain_array import StrainArray
+from estimator.readers.strain_covariance import body_tensors, flat_curvatures, inverse_information
+from estimator.readers.strain_equations import Problem
+from estimator.readers.strain_fit import MOST_STEPS, fit_all
+from estimator.readers.strain_flags import POOR_FIT
+from estimator.readers.strain_start import starts
+from estimator.readers.strain_window import Windows
 from estimator.vectors import Array, Index, Mask
 
 Curvatures = Literal["map", "two", "one"]

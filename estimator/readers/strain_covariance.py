@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimator.hertz import contact_ellipse, indentation
-from estimator.strain_array import StrainArray
+from estimator.readers.hertz import contact_ellipse, indentation
+from estimator.readers.strain_array import StrainArray
 from estimator.vectors import Array
 
 LOOSE = (0.1, 0.1, 5.0, 2e3, 2e3, 2e3)  # bounds of ignorance: x, y [m], ln F, K [1/m]

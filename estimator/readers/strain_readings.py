@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimator.local_surface import LocalSurface
-from estimator.strain_array import StrainArray
-from estimator.strain_covariance import body_tensors, surface_covariance
-from estimator.strain_flags import FLAGS, nothing_to_fit
+from estimator.readers.strain_array import StrainArray
+from estimator.readers.strain_covariance import body_tensors, surface_covariance
+from estimator.readers.strain_flags import FLAGS, nothing_to_fit
 from estimator.vectors import Array, Mask
 
 

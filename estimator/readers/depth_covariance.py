@@ -15,9 +15,9 @@ from __future__ import annotations
 import numpy as np
 
 from estimator.compiled import compiled
-from estimator.depth_cells import COUNT, MEAN, X, Y
-from estimator.depth_fit import TERMS, beyond_quadratic, dome, row_of
-from estimator.depth_noise import two_variances
+from estimator.readers.depth_cells import COUNT, MEAN, X, Y
+from estimator.readers.depth_fit import TERMS, beyond_quadratic, dome, row_of
+from estimator.readers.depth_noise import two_variances
 from estimator.vectors import Array, Mask
 
 LENGTHS = np.array((0.0, 0.25, 0.4, 0.6, 0.9, 1.3, 2.0, 3.0))  # tried where none is told [mm]

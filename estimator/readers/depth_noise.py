@@ -19,8 +19,6 @@ class DepthNoise:
         correlated: Of the smooth part [m] (or [-]).
         length: l of its autocorrelation exp(-r^2 / 2 l^2) [m].
         gain: Relative, of all depths alike [-]: scales the curvature relative to the pad.
-        place: Of the pad in its stated pose, along each axis [m].
-        alignment: Of the pad in its stated pose, about each axis through its middle [rad].
     Raises:
         ValueError: Negative or not finite; correlated noise without a length.
     """
@@ -29,11 +27,9 @@ class DepthNoise:
     correlated: float = 0.03e-3
     length: float = 1.5e-3
     gain: float = 0.0
-    place: float = 0.02e-3
-    alignment: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("white", "correlated", "length", "gain", "place", "alignment"):
+        for name in ("white", "correlated", "length", "gain"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value >= 0.0):
                 raise ValueError(f"depth noise {name}: expected zero or greater, got {value!r}")

@@ -12,9 +12,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from estimator.hertz import curvature_tensor
-from estimator.strain_array import StrainArray
-from estimator.strain_model import predicted_readings
+from estimator.readers.hertz import curvature_tensor
+from estimator.readers.strain_array import StrainArray
+from estimator.readers.strain_model import predicted_readings
 from estimator.vectors import Array, Index, Mask, frozen
 
 SIZES = (0.5, 0.85, 1.25, 1.8)  # sqrt(a b) / d

@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from estimator.response import ResponseModel
-from estimator.strain_array import StrainArray
-from estimator.strain_model import reading_slopes, touch_state
+from estimator.readers.response import ResponseModel
+from estimator.readers.strain_array import StrainArray
+from estimator.readers.strain_model import reading_slopes, touch_state
 from estimator.vectors import Array
 
 

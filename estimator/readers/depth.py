@@ -11,10 +11,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from estimator.depth_fit import TERMS
-from estimator.depth_noise import DepthNoise
-from estimator.depth_reading import CELL, read_images
-from estimator.depth_surfaces import DepthReadings, surfaces_of
+from estimator.readers.depth_fit import TERMS
+from estimator.readers.depth_noise import DepthNoise
+from estimator.readers.depth_reading import CELL, read_images
+from estimator.readers.depth_surfaces import DepthReadings, surfaces_of
 from estimator.vectors import Array, Index
 
 
@@ -29,8 +29,8 @@ def read_depth(
     """Depth images of a gel pad to second-order surface patches.
 
     A quadratic is fitted over the inner part of the contact, which follows from the fit itself
-    (`estimator.depth_fit`); the patch is given at the middle of that domain. Pixels that are not
-    finite are left out.
+    (`estimator.readers.depth_fit`); the patch is given at the middle of that domain. Pixels that
+    are not finite are left out.
 
     Degenerate: a contact reaching the border says little along itself, an umbilic nothing of
     directions; flags say so and the covariance has it. With two contacts the deeper one is read.

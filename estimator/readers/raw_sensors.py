@@ -15,14 +15,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimator.contact import Contact, SensorNoise
-from estimator.depth import read_depth
-from estimator.depth_noise import DepthNoise
 from estimator.local_surface import LocalSurface, contact_from, misplaced
-from estimator.raw_files import RawTouches
+from estimator.readers.depth import read_depth
+from estimator.readers.depth_noise import DepthNoise
+from estimator.readers.raw_files import RawTouches
+from estimator.readers.strain import read_strains
+from estimator.readers.strain_array import StrainArray, taxel_array
+from estimator.readers.strain_flags import NO_CONTACT, TOO_FEW
 from estimator.sensors import sensor_noise
-from estimator.strain import read_strains
-from estimator.strain_array import StrainArray, taxel_array
-from estimator.strain_flags import NO_CONTACT, TOO_FEW
 from estimator.vectors import Array
 
 _DEG = float(np.pi / 180.0)
@@ -89,7 +89,7 @@ def _imaged(signal: Array, pad: DepthPad) -> LocalSurface | None:
     return readings.surface(0) if readings.touched[0] else None
 
 
-_GEL = DepthNoise(white=5e-6, correlated=0.03e-3, length=1.5e-3, gain=0.0, place=0.0, alignment=0.0)
+_GEL = DepthNoise(white=5e-6, correlated=0.03e-3, length=1.5e-3, gain=0.0)
 RAW_SENSORS: dict[str, RawSensor] = {
     sensor.name: sensor
     for sensor in (

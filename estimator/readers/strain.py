@@ -16,9 +16,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from estimator.response import ResponseModel
-from estimator.strain_array import StrainArray
-from estimator.strain_covariance import (
+from estimator.readers.response import ResponseModel
+from estimator.readers.strain_array import StrainArray
+from estimator.readers.strain_covariance import (
     LOOSE,
     body_tensors,
     ellipses_of,
@@ -28,7 +28,7 @@ from estimator.strain_covariance import (
     shared_errors,
     with_prior_pull,
 )  # fmt: skip
-from estimator.strain_flags import (
+from estimator.readers.strain_flags import (
     BY_PRIOR,
     EDGE,
     FLAGS,
@@ -47,10 +47,10 @@ from estimator.strain_flags import (
     umbilic,
     widened,
 )  # fmt: skip
-from estimator.strain_model import DIGITS, predicted_readings, reading_slopes
-from estimator.strain_readings import StrainReadings
-from estimator.strain_solve import Curvatures, Solved, solve
-from estimator.strain_window import Windows, checked_frames, choose_windows
+from estimator.readers.strain_model import DIGITS, predicted_readings, reading_slopes
+from estimator.readers.strain_readings import StrainReadings
+from estimator.readers.strain_solve import Curvatures, Solved, solve
+from estimator.readers.strain_window import Windows, checked_frames, choose_windows
 from estimator.vectors import Array, Mask
 
 FLAT_PRIOR = (10.0, 10.0)  # mean, sd of the flat curvature [1/m]: 40 mm to flat within 1.5 sd

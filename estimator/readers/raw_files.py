@@ -12,8 +12,8 @@ An .npz file with N touches of one kind of sensor:
 | `sensor`      | ()           | kind of the sensor, such as "gel-depth", optional                |
 | `pad_radius`  | ()           | m, of a domed pad, with `depth` only, optional (flat)            |
 
-The frame S is the reader's (`estimator.depth`, `estimator.strain`). Nothing in the file is run:
-pickled objects are refused.
+The frame S is the reader's (`estimator.readers.depth`, `estimator.readers.strain`). Nothing in the
+file is run: pickled objects are refused.
 """
 
 from __future__ import annotations

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from estimator.compiled import compiled
-from estimator.hertz import ellipse_into
-from estimator.strain_model import ellipse_readings, over_curvature
-from estimator.strain_quadrature import MOST_NODES
+from estimator.readers.hertz import ellipse_into
+from estimator.readers.strain_model import ellipse_readings, over_curvature
+from estimator.readers.strain_quadrature import MOST_NODES
 from estimator.vectors import Array, Index
 
 ROUGH_DIGITS = 3.0  # of the quadrature while the ellipse is fitted

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimator.strain_array import StrainArray
-from estimator.strain_covariance import relative_tensors
-from estimator.strain_window import FEWEST, Windows
+from estimator.readers.strain_array import StrainArray
+from estimator.readers.strain_covariance import relative_tensors
+from estimator.readers.strain_window import FEWEST, Windows
 from estimator.vectors import Array, Mask
 
 NO_CONTACT = "no contact"
@@ -95,18 +95,19 @@ def widened(
     A poor fit scales by the residual; outside the model's range (linear strain, window) the
     curvatures may be off by half themselves; of two contacts nothing is known but roughly where.
     A long ellipse that is seen in its middle has a true direction and curvature across; what the
-    window does not see of it counts as a twelfth.
+    window does not see of it counts as a twelfth. On a curved finger, where any misfit becomes an
+    error of direction, it counts as a third.
     """
     out = covariances * np.where(residuals > POOR_FIT, residuals**2, 1.0)[:, None, None]
     size = np.linalg.norm(relative_tensors(states), axis=(1, 2))
     off = raised[:, FLAGS.index(BEYOND)] | raised[:, FLAGS.index(EDGE)]
     long = raised[:, FLAGS.index(LONG)]
     lost = raised[:, FLAGS.index(TWO)]
-    added = np.zeros((len(states), 6))
+    added, unseen = np.zeros((len(states), 6)), 0.08 if array.curvature == 0.0 else 0.33
     pitch = 0.5 * max(array.axial_pitch, array.arc_pitch)
     added[:, :2] = np.where(lost, 2.0 * pitch, np.where(off | long, 0.25 * pitch, 0.0))[:, None]
     added[:, 2] = np.where(lost, 1.0, np.where(off, 0.3, np.where(long, 0.1, 0.0)))
-    share = np.where(off, 0.5, np.where(long, 0.08, 0.0))
+    share = np.where(off, 0.5, np.where(long, unseen, 0.0))
     added[:, 3:] = np.where(lost, 1e3, share * size)[:, None]
     index = np.arange(6)
     out[:, index, index] += np.square(added)

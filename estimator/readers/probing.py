@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from estimator.disk_rule import HERTZ, PUNCH, disk_rule
-from estimator.response import ResponseModel
+from estimator.readers.disk_rule import HERTZ, PUNCH, disk_rule
+from estimator.readers.response import ResponseModel
 from estimator.vectors import Array, frozen
 
 ProbeTip = Literal["flat", "spherical"]

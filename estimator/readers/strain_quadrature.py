@@ -13,7 +13,7 @@ import numpy as np
 from scipy.special import roots_jacobi
 
 from estimator.compiled import compiled
-from estimator.response import response_at
+from estimator.readers.response import response_at
 from estimator.vectors import Array
 
 MOST_NODES = 24  # along one axis: five digits at a = 5 d

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.depth_fit import dome_terms
-from estimator.depth_noise import DepthNoise
-from estimator.depth_reading import FLAGS, NO_CONTACT, SMALL, UMBILIC
 from estimator.local_surface import ERRORS, LocalSurface
+from estimator.readers.depth_fit import dome_terms
+from estimator.readers.depth_noise import DepthNoise
+from estimator.readers.depth_reading import FLAGS, NO_CONTACT, SMALL, UMBILIC
 from estimator.vectors import Array, Index, Mask, cross, frozen
 
 _UNKNOWN = (2e-3, 0.2, 100.0)  # sd of place [m], normal [rad], curvature [1/m] where no fit exists
@@ -79,7 +79,7 @@ def surfaces_of(
     p = np.column_stack([centres * 1e-3, theta[:, 0]])
     frames, along = _frames(theta[:, 1:3])
     K, J = _tensors(theta, frames, along)
-    cov8 = J @ cov @ J.transpose(0, 2, 1) + _pose_errors(p, frames, K, noise)
+    cov8 = J @ cov @ J.transpose(0, 2, 1)
     unfitted = (bits & (NO_CONTACT | SMALL)) > 0
     p_sd, n_sd, k_sd = _UNKNOWN
     cov8[unfitted] = np.diag(np.square([p_sd, p_sd, p_sd, n_sd, n_sd, k_sd, k_sd, k_sd]))
@@ -129,24 +129,6 @@ def _tensors(theta: Array, frames: Array, along: Array) -> tuple[Array, Array]:
         J[:, row, 4] = p[:, 0] * q[:, 1] + p[:, 1] * q[:, 0]
         J[:, row, 5] = p[:, 1] * q[:, 1]
     return K, J
-
-
-def _pose_errors(p: Array, frames: Array, K: Array, noise: DepthNoise) -> Array:
-    """What a pad that is not quite where it is said to be adds, (B, 8, 8).
-
-    A small turn w moves p by w x p, n by w x n, and turns the tensor by w.n about the normal.
-    """
-    J = np.zeros((len(p), ERRORS, 3))
-    for k, axis in enumerate(np.eye(3)):
-        J[:, :3, k] = np.einsum("bij,bj->bi", frames, cross(axis, p))
-        J[:, 3:5, k] = np.einsum("bij,bj->bi", frames[:, :2], cross(axis, frames[:, 2]))
-        spin = frames[:, 2, k]
-        J[:, 5, k] = -2.0 * spin * K[:, 0, 1]
-        J[:, 6, k] = 2.0 * spin * K[:, 0, 1]
-        J[:, 7, k] = spin * (K[:, 0, 0] - K[:, 1, 1])
-    out = noise.alignment**2 * J @ J.transpose(0, 2, 1)
-    out[:, :3, :3] += noise.place**2 * np.eye(3)
-    return out
 
 
 def _pad_terms(centres: Array, radius: float) -> Array:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from estimator.strain_array import StrainArray
+from estimator.readers.strain_array import StrainArray
 from estimator.vectors import Array, Index, Mask
 
 FEWEST = 8  # live tactels that six unknowns and a residual need

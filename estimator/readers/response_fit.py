@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from estimator.probing import Probe, Probing
-from estimator.response import ResponseModel
-from estimator.response_models import boussinesq, separable, table
+from estimator.readers.probing import Probe, Probing
+from estimator.readers.response import ResponseModel
+from estimator.readers.response_models import boussinesq, separable, table
 from estimator.vectors import Array, frozen
 
 # Start, smallest, largest and scale of every parameter; lengths in metres.

@@ -11,10 +11,15 @@ from __future__ import annotations
 import numpy as np
 
 from estimator.compiled import compiled
-from estimator.hertz import ellipse_into
-from estimator.response import POINT_LOAD, ResponseModel
-from estimator.strain_array import StrainArray
-from estimator.strain_quadrature import MOST_NODES, disk_nodes, point_load_sums, response_sums
+from estimator.readers.hertz import ellipse_into
+from estimator.readers.response import POINT_LOAD, ResponseModel
+from estimator.readers.strain_array import StrainArray
+from estimator.readers.strain_quadrature import (
+    MOST_NODES,
+    disk_nodes,
+    point_load_sums,
+    response_sums,
+)
 from estimator.vectors import Array, Index
 
 DIGITS = 5.5  # of the quadrature; a strain finger rounds to two of its peak's

@@ -11,8 +11,15 @@ from __future__ import annotations
 import numpy as np
 
 from estimator.compiled import compiled
-from estimator.hertz import curvature_into, ellipse_into
-from estimator.strain_equations import Problem, Room, allowed, evaluate, new_room, solve_into
+from estimator.readers.hertz import curvature_into, ellipse_into
+from estimator.readers.strain_equations import (
+    Problem,
+    Room,
+    allowed,
+    evaluate,
+    new_room,
+    solve_into,
+)
 from estimator.vectors import Array, Index
 
 MOST_STEPS = 60

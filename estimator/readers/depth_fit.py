@@ -20,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 from estimator.compiled import compiled
-from estimator.depth_cells import COUNT, MEAN, X, Y
+from estimator.readers.depth_cells import COUNT, MEAN, X, Y
 from estimator.vectors import Array, Mask
 
 TERMS = 6  # c, g_x, g_y, H_xx, H_xy, H_yy

@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike
 from scipy.fft import dctn, idctn
 
 from estimator.compiled import compiled
-from estimator.depth import images_of, require_positive
-from estimator.depth_cells import COUNT, MEAN, X, Y, pool
-from estimator.depth_covariance import smooth_moment, trace_product
-from estimator.depth_fit import TERMS, dome, inverse
-from estimator.depth_noise import DepthNoise
-from estimator.depth_reading import (
+from estimator.readers.depth import images_of, require_positive
+from estimator.readers.depth_cells import COUNT, MEAN, X, Y, pool
+from estimator.readers.depth_covariance import smooth_moment, trace_product
+from estimator.readers.depth_fit import TERMS, dome, inverse
+from estimator.readers.depth_noise import DepthNoise
+from estimator.readers.depth_reading import (
     BORDER,
     CELL,
     NO_CONTACT,
@@ -29,7 +29,7 @@ from estimator.depth_reading import (
     locate,
     place_only,
 )
-from estimator.depth_surfaces import DepthReadings, surfaces_of
+from estimator.readers.depth_surfaces import DepthReadings, surfaces_of
 from estimator.vectors import Array, Index, Mask
 
 HEIGHT_SHARE = 0.25  # sd of the height over the greatest depth: slopes leave it open
@@ -51,8 +51,9 @@ def read_normals(
     the integrated slopes reach over the image's lowest tenth.
 
     Args:
-        normals: Of the gel's surface, out of the gel (z > 0), in the frame S of `estimator.depth`;
-            of any length, NaN where a pixel is dead, (H, W, 3) or (B, H, W, 3).
+        normals: Of the gel's surface, out of the gel (z > 0), in the frame S of
+            `estimator.readers.depth`; of any length, NaN where a pixel is dead, (H, W, 3) or
+            (B, H, W, 3).
         pixel_pitch: Distance of neighbouring pixels on the gel [m].
         pad_radius: Of the undeformed gel's spherical dome [m]; inf is a flat pad.
         noise: Of each *slope* [-], independent in x and y. None takes each image's residual as

@@ -13,8 +13,8 @@ from typing import Literal
 
 import numpy as np
 
-from estimator.response import ResponseModel
-from estimator.response_models import boussinesq, pressure
+from estimator.readers.response import ResponseModel
+from estimator.readers.response_models import boussinesq, pressure
 from estimator.vectors import Array, frozen
 
 FINGER_RADIUS = 12.7e-3

@@ -5,9 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from estimator.compiled import compiled
-from estimator.depth_cells import COUNT, MEAN, X, Y, deepest_cell, flood, other_blob, pool
-from estimator.depth_covariance import expected_square, noise_of_residuals, residuals, smooth_moment
-from estimator.depth_fit import (
+from estimator.readers.depth_cells import COUNT, MEAN, X, Y, deepest_cell, flood, other_blob, pool
+from estimator.readers.depth_covariance import (
+    expected_square,
+    noise_of_residuals,
+    residuals,
+    smooth_moment,
+)
+from estimator.readers.depth_fit import (
     FEWEST_CELLS,
     ROUNDS,
     TERMS,

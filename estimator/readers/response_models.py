@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.ndimage import spline_filter
 
-from estimator.response import (
+from estimator.readers.response import (
     CUBIC,
     HEADER,
     KINDS,

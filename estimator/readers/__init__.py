@@ -1,0 +1,1 @@
+"""Readers: raw signals of tactile sensors to a patch of surface with covariance."""
