@@ -8,8 +8,9 @@ from planner.grasp_hold import Friction
 from planner.reach_task import ReachOptions
 
 _GRASP_REACH = ReachOptions(
-    starts=0, rescues=0, least_standoff=0.012, least_overshoot=0.008, overshoot=0.020
-)
+    starts=0, rescues=0, least_standoff=0.012, least_overshoot=0.008, overshoot=0.020,
+    clearance=4e-3,  # twice what an axis that is known well enough may be off
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
