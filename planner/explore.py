@@ -1,9 +1,9 @@
 """Plan, touch, learn, and again: a generator that the caller bounds.
 
 Where three fingers reach at once, they touch in one placement of the hand; where not, two or one
-do, and the hand moves between. Once the axes that are left have to be told apart, or the goal is
-near, single touches follow (`planner.next_touch`). Touches that contradict earlier ones widen the
-belief (`planner.surprise`), and a placement that agrees is needed before the goal counts as met.
+do, and the hand moves between. Where several axes are left, or the first touches meet the goal with
+nothing to confirm them, a single touch follows (`planner.next_touch`). Touches that contradict
+earlier ones widen the belief (`planner.surprise`), and others have to agree before the goal counts.
 """
 
 from __future__ import annotations
@@ -87,8 +87,8 @@ def _plan(
     rng: np.random.Generator,
     options: PlannerOptions,
 ) -> Plan:
-    """A touch that tells the axes apart where several are left, a placement otherwise."""
-    if _ambiguous(belief) and options.criterion == "information":
+    """One touch to tell the axes apart or to confirm the only one, a placement otherwise."""
+    if (_ambiguous(belief) or goal.met_by(belief)) and options.criterion == "information":
         try:
             return next_touch(hand, belief, sensor, goal=goal, rng=rng, options=options)
         except NoPlan:

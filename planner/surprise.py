@@ -29,7 +29,7 @@ from estimator.prior import AxisPrior
 from estimator.vectors import Array, basis_across, frozen
 
 FEIGNED = 10.0  # real readings fit a little worse than their model: their p-value counts so often
-ALARM = 3e-3  # probability of a false alarm at a placement, by either test
+ALARM = 0.01  # probability of a false alarm at a placement, by either test
 WALL = 0.7  # |n . u| beyond which a contact is not on the wall
 ONCE_BITTEN = 0.1  # the same after a first alarm, when the next placement has to agree
 MENTIONED = 0.01  # hypotheses that may be the right one
@@ -66,15 +66,15 @@ class Learnt:
 
     Args:
         belief: What is held true.
-        settled: Whether the last placement agreed with what was believed before it, once anything
-            contradicted: a goal that is met by touches nobody confirmed does not count.
+        settled: Whether later touches agreed with earlier ones, after the last that did not: a goal
+            that is met by touches nothing confirmed does not count.
         surprise: What the last touches contradicted and what was done; None where nothing.
         surprises: How often that happened.
         restless: By how much every contact counts as worse placed [m].
     """
 
     belief: Belief
-    settled: bool = True
+    settled: bool = False
     surprise: str | None = None
     surprises: int = 0
     restless: float = 0.0
@@ -86,8 +86,8 @@ def learn(known: Learnt, outcomes: Sequence[Contact | Miss]) -> Learnt:
     belief = update(known.belief, felt)
     motion = motion_between(known.belief, belief, felt)
     if motion is None or motion.p_value > (ONCE_BITTEN if known.surprises else ALARM):
-        agreed = known.settled or any(isinstance(touch, Contact) for touch in felt)
-        return replace(known, belief=belief, settled=agreed, surprise=None)
+        settled = known.settled or motion is not None
+        return replace(known, belief=belief, settled=settled, surprise=None)
     surprises, restless = known.surprises + 1, known.restless
     words = f"{motion.words}. Earlier contacts now count only as a wider prior"
     if surprises >= RESTLESS:
