@@ -219,6 +219,8 @@ def picture(criteria: Sequence[Criterion], points: list[Point]) -> bytes:
             (line,) = axes.plot(shown, middle, marker="o", ms=3, label=criterion)
             axes.fill_between(shown, low, high, color=line.get_color(), alpha=0.08, lw=0)
         axes.set(xlabel="touches", ylabel=f"error of the {words}", yscale="log", xticks=counts)
+        axes.yaxis.set_major_formatter("{x:g}")
+        axes.yaxis.set_minor_formatter("{x:g}")
         axes.grid(alpha=0.3, which="both")
     figure.axes[0].legend(fontsize=8)
     file = io.BytesIO()

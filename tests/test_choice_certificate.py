@@ -152,5 +152,5 @@ def test_labels_that_stay_ambiguous_are_said():
     level, apart = (
         told(blind, (0, 70, 200), z).get(AMBIGUOUS, 0.0) for z in ((0, 0, 0), (-25, 0, 25))
     )
-    assert level > 0.3
-    assert apart < level
+    assert level > 0.1
+    assert apart == 0.0

@@ -92,7 +92,7 @@ def test_information_has_the_least_expected_error_up_to_the_pairs_share():
 
 
 def test_d_optimal_does_not_ask_what_the_goal_is():
-    """A determinant only changes by a factor with the units; an expected error in goals does not."""
+    """Units only change a determinant by a factor; an expected error in goals they do change."""
     candidates, other = random_placements(), Goal(np.deg2rad(0.3), 50e-3)
     for criterion, same in (("d-optimal", True), ("information", False)):
         here, there = (ranked(candidates, criterion, goal=goal) for goal in (GOAL, other))
