@@ -57,16 +57,13 @@ def telling_contact(
         None where fewer than two hypotheses matter, fewer than two contacts are given, or no place
         is expected to tell them apart.
     """
-    rivals = [h for h in hypotheses[:RIVALS] if h.probability > UNLIKELY]
+    rivals = _rivals(hypotheses)
     if len(rivals) < 2 or len(contacts) < 2:
         return None
     places = _places(rivals[0].axis, contacts)
     if not len(places.p):
         return None
-    P = np.array([h.probability for h in rivals]) / sum(h.probability for h in rivals)
-    axes = [h.axis for h in rivals]
-    tried = [_after(places, k, axes, contacts, prior, assumptions) for k in range(len(axes))]
-    log_odds, worth = (np.array(row) for row in zip(*tried, strict=True))
+    P, log_odds, worth = _tried(rivals, contacts, places, prior, assumptions)
     best = int(np.argmax(P @ worth))
     if P @ (log_odds[:, best] - np.log(P / (1.0 - P))) < TELLS:
         return None
@@ -76,6 +73,50 @@ def telling_contact(
         log_odds=float(P @ log_odds[:, best]),
         pair=(0, 1),
     )
+
+
+def telling_worth(
+    hypotheses: Sequence[Hypothesis],
+    contacts: Sequence[Contact],
+    targets: Array,
+    *,
+    prior: AxisPrior | None = None,
+    assumptions: Assumptions = DEFAULT,
+) -> Array | None:
+    """What touching at given places would be worth to tell the hypotheses apart.
+
+    Args:
+        hypotheses, contacts, prior, assumptions: As for `telling_contact`.
+        targets: Near the surface of the likeliest hypothesis, world [m], (G, 3).
+    Returns:
+        Log odds expected of the right axis, less what the axis would still be uncertain, (G,);
+        None where there is nothing to tell apart.
+    """
+    rivals = _rivals(hypotheses)
+    if len(rivals) < 2 or len(contacts) < 2:
+        return None
+    places = surface_through(rivals[0].axis, contacts, targets)
+    P, _, worth = _tried(rivals, contacts, places, prior, assumptions)
+    return np.asarray(P @ worth)
+
+
+def _rivals(hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+    return [h for h in hypotheses[:RIVALS] if h.probability > UNLIKELY]
+
+
+def _tried(
+    rivals: Sequence[Hypothesis],
+    contacts: Sequence[Contact],
+    places: Geometry,
+    prior: AxisPrior | None,
+    assumptions: Assumptions,
+) -> tuple[Array, Array, Array]:
+    """Probability of each rival (R,); log odds and worth of each place, were it right, (R, G)."""
+    P = np.array([h.probability for h in rivals]) / sum(h.probability for h in rivals)
+    axes = [h.axis for h in rivals]
+    tried = [_after(places, k, axes, contacts, prior, assumptions) for k in range(len(axes))]
+    log_odds, worth = (np.array(row) for row in zip(*tried, strict=True))
+    return P, log_odds, worth
 
 
 def telling_words(telling: TellingContact | None) -> str:

@@ -8,7 +8,7 @@ triples with the joint angles and the base pose that nearly make them; `reach` m
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -24,6 +24,7 @@ from planner.laying import Laid, lay
 from planner.workspace import Workspace
 
 END_MARGIN = 0.08  # of the believed height, kept from both ends
+TURNS = 48  # about the object's axis, where the base is bounded
 GAP = 2e-3  # of a laid pad from the surface that reach will close [m]
 INTRUSION = 4e-3  # of a link sphere into the believed object that reach will remove [m]
 
@@ -106,6 +107,7 @@ def _kept(
     workspace: Workspace,
 ) -> Candidates:
     """The placements that hold, and a count of those that do not, by reason."""
+    laid = _turned_towards(workspace, surface, laid)
     q = laid.q
     low, high = surface.profile.z_range
     margin = END_MARGIN * (high - low)
@@ -135,6 +137,33 @@ def _kept(
         laid.z[alive],
         laid.pad_angle[alive],
         tuple(rejected),
+    )
+
+
+def _turned_towards(workspace: Workspace, surface: SurfaceOfRevolution, laid: Laid) -> Laid:
+    """Placements turned about the object's axis to where the base is nearest to its workspace.
+
+    On a surface of revolution that changes nothing else.
+    """
+    if workspace.X_WB is None:
+        return laid
+    angle = np.arange(TURNS) * (2.0 * np.pi / TURNS)
+    c, s, zero, one = np.cos(angle), np.sin(angle), np.zeros(TURNS), np.ones(TURNS)
+    turns = np.stack([c, -s, zero, s, c, zero, zero, zero, one], axis=1).reshape(-1, 3, 3)
+    X = workspace.X_WB
+    R_OB = np.einsum("kij,njm->knim", turns, laid.R_OB)
+    p_OB = np.einsum("kij,nj->kni", turns, laid.p_OB)
+    R_WB = np.einsum("ji,knjm->knim", surface.frame, R_OB)
+    p_WB = surface.axis.point + p_OB @ surface.frame
+    off = workspace.violation(R_WB.reshape(-1, 3, 3), p_WB.reshape(-1, 3)).reshape(TURNS, -1)
+    near = np.linalg.norm(p_WB - X.translation, axis=2) - np.einsum("ij,knij->kn", X.rotation, R_WB)
+    best = np.argmin(off + 1e-6 * near, axis=0)
+    rows = np.arange(len(best))
+    return replace(
+        laid,
+        R_OB=R_OB[best, rows],
+        p_OB=p_OB[best, rows],
+        theta=np.angle(np.exp(1j * (laid.theta + angle[best, None]))),
     )
 
 

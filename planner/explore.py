@@ -1,4 +1,10 @@
-"""Plan, touch, learn, and again: a generator that the caller bounds."""
+"""Plan, touch, learn, and again: a generator that the caller bounds.
+
+Where three fingers reach at once, they touch in one placement of the hand; where not, two or one
+do, and the hand moves between. Once the axes that are left have to be told apart, or the goal is
+near, single touches follow (`planner.next_touch`). Touches that contradict earlier ones widen the
+belief (`planner.surprise`), and a placement that agrees is needed before the goal counts as met.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +13,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.belief import Belief, update
+from estimator.belief import Belief
 from estimator.contact import Contact, Miss, SensorNoise
 from hand_models.hand import Hand
 from planner.goal import Goal
+from planner.next_touch import next_touch
 from planner.options import PlannerOptions
-from planner.plan import Plan, Probe, plan_probes
+from planner.plan import NoPlan, Plan, Probe, plan_probes
+from planner.surprise import Learnt, learn
 
 Touch = Callable[[Probe], Contact | Miss]
 
@@ -26,6 +34,7 @@ class Step:
         outcomes: A contact or a miss for each probe.
         before, after: The belief.
         touches: All probes made so far.
+        surprise: What the touches contradicted and what was done about it; None where nothing.
     """
 
     plan: Plan
@@ -33,6 +42,7 @@ class Step:
     before: Belief
     after: Belief
     touches: int
+    surprise: str | None = None
 
 
 def explore(
@@ -58,18 +68,39 @@ def explore(
     if budget < 1:
         raise ValueError(f"budget: expected at least one touch, got {budget}")
     options = options or PlannerOptions()
-    touches = 0
-    while touches < budget and not goal.met_by(belief):
-        at_once = min(options.fingers_at_once, budget - touches)
-        this_time = replace(
-            options, fingers_at_once=at_once, margin=options.margin if _fresh(belief) else 0.0
-        )
-        plan = plan_probes(hand, belief, sensor, goal=goal, rng=rng, options=this_time)
+    learnt, touches = Learnt(belief), 0
+    while touches < budget and not (goal.met_by(learnt.belief) and learnt.settled):
+        before = learnt.belief
+        plan = _plan(hand, before, sensor, goal, budget - touches, rng, options)
         outcomes = tuple(touch(probe) for probe in plan.probes)
         touches += len(outcomes)
-        after = update(belief, outcomes)
-        yield Step(plan, outcomes, belief, after, touches)
-        belief = after
+        learnt = learn(learnt, outcomes)
+        yield Step(plan, outcomes, before, learnt.belief, touches, learnt.surprise)
+
+
+def _plan(
+    hand: Hand,
+    belief: Belief,
+    sensor: SensorNoise,
+    goal: Goal,
+    left: int,
+    rng: np.random.Generator,
+    options: PlannerOptions,
+) -> Plan:
+    """A touch that tells the axes apart where several are left, a placement otherwise."""
+    if _ambiguous(belief) and options.criterion == "information":
+        try:
+            return next_touch(hand, belief, sensor, goal=goal, rng=rng, options=options)
+        except NoPlan:
+            pass
+    at_once = min(options.fingers_at_once, left)
+    margin = options.margin if _fresh(belief) else 0.0
+    this_time = replace(options, fingers_at_once=at_once, margin=margin)
+    return plan_probes(hand, belief, sensor, goal=goal, rng=rng, options=this_time)
+
+
+def _ambiguous(belief: Belief) -> bool:
+    return belief.estimate is not None and belief.estimate.verdict == "ambiguous"
 
 
 def _fresh(belief: Belief) -> bool:

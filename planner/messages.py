@@ -44,6 +44,12 @@ def plan_record(plan: Plan) -> dict[str, Any]:
             "object_clearance": reach.object_clearance,
             "solver": reach.solver,
         },
+        "retreat": {
+            "joint_positions": plan.retreat.q.tolist(),
+            "base_poses": [pose_record(X) for X in plan.retreat.bases],
+            "clearance": plan.retreat.clearance,
+            "wanted": plan.retreat.wanted,
+        },
         "bound": {"angle": _finite(plan.bound.angle), "position": _finite(plan.bound.position)},
         "expected_error": {"angle": _finite(plan.angle), "offset": _finite(plan.offset)},
         "predicted_covariance": plan.covariance.tolist(),
@@ -79,6 +85,7 @@ def probe_record(probe: Probe) -> dict[str, Any]:
             "contact_index": approach.contact_index,
             "standoff": approach.standoff,
             "overshoot": approach.overshoot,
+            "force_goal": approach.force_goal,
         },
     }
 
@@ -92,6 +99,7 @@ def step_record(step: Step) -> dict[str, Any]:
             outcome_record(probe.finger, outcome)
             for probe, outcome in zip(step.plan.probes, step.outcomes, strict=True)
         ],
+        "surprise": step.surprise,
         "expected_error": {"angle": step.plan.angle, "offset": step.plan.offset},
         "axis": axis_record(step.after.hypotheses[0]),
         "estimate": estimate_record(estimate) if estimate is not None else None,

@@ -20,6 +20,7 @@ from planner.reach import Reach
 Array = NDArray[np.float64]
 
 SPACING = 2e-3  # between waypoints, at most [m]
+FORCE_GOAL = 0.5  # a soft pad feels that, and hardly any object moves [N]
 ARM_STROKE = 0.03  # before and behind the contact, where the arm moves [m]
 _OFF_LINE = 2e-4  # of the pad's centre, where an overshoot ends [m]
 _JUMP = 0.2  # of a joint between waypoints, likewise [rad]
@@ -41,6 +42,7 @@ class Approach:
         standoff, overshoot: Lengths before and behind the contact [m].
         straightness: Largest distance of a waypoint from the straight line [m].
         finger_axis: Along the finger's last link at the contact, world, unit, (3,).
+        force_goal: At which the finger stops and goes back the way it came [N].
     """
 
     finger: str
@@ -53,6 +55,7 @@ class Approach:
     overshoot: float
     straightness: float
     finger_axis: Array
+    force_goal: float = FORCE_GOAL
 
 
 def plan_approaches(hand: Hand, reach: Reach) -> tuple[Approach, ...]:

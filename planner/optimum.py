@@ -38,10 +38,10 @@ class ChoiceCertificate:
     Args:
         floor: What no touches anywhere have less than, extrapolated between places (`Optimum`).
         optimum: The best nonsingular set of places, were every place in reach.
-        reachable: The best nonsingular placement of those found for this hand.
+        reachable: The best nonsingular placement of those ranked for this hand.
         chosen: The touches planned.
         sets: How many the optimum is the best of.
-        placements: How many the hand's best is the best of.
+        placements: How many were ranked, after `scored` triples within reach of the best ones.
     """
 
     floor: float
@@ -50,6 +50,7 @@ class ChoiceCertificate:
     chosen: float
     sets: int
     placements: int
+    scored: int
 
     @property
     def excess(self) -> float:
@@ -60,14 +61,20 @@ class ChoiceCertificate:
     def words(self) -> str:
         """One sentence."""
         return (
-            f"expected error {self.chosen:.2f} goals; best of {self.placements} placements "
-            f"{self.reachable:.2f}, were every place in reach {self.optimum:.2f} (best of "
+            f"expected error {self.chosen:.2f} goals; best of {self.placements + self.scored} "
+            f"within reach {self.reachable:.2f}, were every place in reach {self.optimum:.2f} (best of "
             f"{self.sets} sets), nowhere below {self.floor:.2f}"
         )
 
 
-def certificate(worth: Worth, ranking: Ranking, i: int, *, margin: float) -> ChoiceCertificate:
-    """Of the ranking's candidate i among its like and among all places there are."""
+def certificate(
+    worth: Worth, ranking: Ranking, i: int, *, margin: float, scored: int = 0
+) -> ChoiceCertificate:
+    """Of the ranking's candidate i among its like and among all places there are.
+
+    Args:
+        scored: How many triples the ranked ones were the best of.
+    """
     kept = ranking.margin >= margin
     best = best_touches(worth, place_grid(worth.belief.surface), ranking.touches, margin=margin)
     return ChoiceCertificate(
@@ -77,6 +84,7 @@ def certificate(worth: Worth, ranking: Ranking, i: int, *, margin: float) -> Cho
         chosen=float(ranking.value[i]),
         sets=best.sets,
         placements=int(kept.sum()),
+        scored=scored,
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from planner.choice import MARGIN
 from planner.criteria import Criterion
+from planner.motion import FORCE_GOAL
 from planner.reach_task import ReachOptions
 
 OFFSET_GUARD = float(np.deg2rad(5.0))
@@ -30,19 +31,24 @@ class PlannerOptions:
         criterion: By what placements are put in order: `planner.criteria` says what each means.
         grasp_height: Where along the believed axis the offset counts, from its point: the place
             of the later grasp [m].
+        sweep: Whether every triple that the fingers reach from the best placements is scored, too
+            (`planner.sweep`); criterion `information` only.
         certify: Whether a plan says how good it is among all touches that there are.
+        force_goal: At which a touching finger stops [N].
     """
 
     reach: ReachOptions = field(default_factory=lambda: ReachOptions(starts=0, rescues=1))
     fingers_at_once: int = 3
     margin: float = MARGIN
-    placements: int = 1200
+    placements: int = 600
     objects: int = 20
     tries: int = 24
     offset_guard: float = OFFSET_GUARD
     criterion: Criterion = "information"
     grasp_height: float = 0.0
+    sweep: bool = True
     certify: bool = True
+    force_goal: float = FORCE_GOAL
 
     def __post_init__(self) -> None:
         if self.fingers_at_once not in (1, 2, 3):
@@ -50,6 +56,8 @@ class PlannerOptions:
         if self.criterion not in get_args(Criterion):
             known = ", ".join(get_args(Criterion))
             raise ValueError(f"criterion {self.criterion!r} is unknown; known are {known}")
+        if not (np.isfinite(self.force_goal) and self.force_goal > 0.0):
+            raise ValueError(f"force_goal: expected a force > 0 N, got {self.force_goal}")
         for name in ("placements", "objects", "tries"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name}: expected at least 1, got {getattr(self, name)}")

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from estimator.belief import Belief, sample_objects
 from estimator.bounds import AxisBound
-from estimator.contact import Contact, SensorNoise
+from estimator.contact import SensorNoise
 from estimator.surface import Place, SurfaceOfRevolution
-from estimator.vectors import Array, frozen
+from estimator.vectors import Index, frozen
+from hand_models.collision import HandCollision
 from hand_models.hand import Hand
 from hand_models.postures import Postures, posture_library
 from hand_models.spheres import LinkSpheres, link_spheres
@@ -20,86 +23,24 @@ from planner.candidates import Candidates, placement_candidates, single_candidat
 from planner.choice import Ranking, rank
 from planner.goal import Goal
 from planner.motion import Approach, approach_by_base, plan_approaches
-from planner.optimum import ChoiceCertificate, certificate
+from planner.optimum import certificate
 from planner.options import PlannerOptions
+from planner.plan_types import Funnel, NoPlan, Plan, Probe
 from planner.reach import Reach, ReachSolver, Unreachable
 from planner.reach_task import ReachOptions
-from planner.risk import Risk, risks
+from planner.retreat import Retreat, plan_retreat
+from planner.risk import risks
 from planner.solid import RevolvedSolid
 from planner.starts import Start
+from planner.sweep import FROM, swept, with_swept
 from planner.worth import Worth, guarded
 
-Funnel = tuple[tuple[str, int], ...]
+__all__ = ["NoPlan", "Plan", "Probe", "plan_preferred", "plan_probes"]
+
+Preference = Callable[[Candidates, Ranking], Index]
 
 SOLID_HEIGHTS = 101
 RISK_OBJECTS = 40
-
-
-@dataclass(frozen=True, eq=False)
-class Probe:
-    """One touch to make.
-
-    Args:
-        finger: Which finger.
-        place: Where on the believed surface.
-        expected: The contact if the object is as believed (first row the parallel's).
-        q: Joint positions with the pad on the contact [rad].
-        approach: The way there, and beyond, should the object be farther away.
-    """
-
-    finger: str
-    place: Place
-    expected: Contact
-    q: Array
-    approach: Approach
-
-
-@dataclass(frozen=True, eq=False)
-class Plan:
-    """Probes of one placement of the hand, in order, and why these.
-
-    Args:
-        probes: One for each finger that touches.
-        reach: Joint angles and base pose with all pads on their contacts, certified.
-        bound: Worst case of the axis from the best pair of the probes.
-        covariance: Of the axis after the probes, if the object is as believed, (4, 4).
-        angle, offset: Expected error of the axis after them, over the belief [rad], [m].
-        margin: From the nearest singularity, in nine of ten objects; inf below three contacts.
-        nearest: That singularity in words.
-        label_probability: That the labels come out right; NaN where it was not computed.
-        funnel: How many candidates there were, and what refused the others.
-        risks: What is at least 5 % likely to leave the axis untold, the likeliest first.
-        choice: How good these touches are among all that there are; None where not asked.
-    """
-
-    probes: tuple[Probe, ...]
-    reach: Reach
-    bound: AxisBound
-    covariance: Array
-    angle: float
-    offset: float
-    margin: float
-    nearest: str
-    label_probability: float
-    funnel: Funnel
-    risks: tuple[Risk, ...] = ()
-    choice: ChoiceCertificate | None = None
-
-
-class NoPlan(Exception):
-    """Nothing that this hand reaches would do.
-
-    Attributes:
-        funnel: What refused the candidates, with counts, in order.
-    """
-
-    def __init__(self, funnel: Funnel) -> None:
-        self.funnel = funnel
-        told = ", ".join(f"{reason} {count}" for reason, count in funnel if count)
-        super().__init__(
-            f"no placement of the hand makes good contacts: {told}. A wider pad cone, a larger "
-            "workspace, or an object nearer to the hand would help"
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,12 +50,24 @@ class _Tools:
     hand: Hand
     postures: Postures
     spheres: LinkSpheres
+    collision: HandCollision
     solver: ReachSolver
+
+
+class _Made(NamedTuple):
+    """A placement made exact: certified, with the ways to the contacts and out."""
+
+    reach: Reach
+    approaches: tuple[Approach, ...]
+    retreat: Retreat
 
 
 @lru_cache(maxsize=8)
 def _tools(hand: Hand, options: ReachOptions) -> _Tools:
-    return _Tools(hand, posture_library(hand), link_spheres(hand), ReachSolver(hand, options))
+    return _Tools(
+        hand, posture_library(hand), link_spheres(hand), HandCollision(hand),
+        ReachSolver(hand, options),
+    )  # fmt: skip
 
 
 def plan_probes(
@@ -138,10 +91,34 @@ def plan_probes(
         NoPlan: Not even a single touch is left; its funnel says why.
     """
     options = options or PlannerOptions()
+    most = min(options.fingers_at_once, len(hand.fingers))
+    counts = range(most, 0, -1)
+    return plan_preferred(hand, belief, sensor, counts, goal=goal, rng=rng, options=options)
+
+
+def plan_preferred(
+    hand: Hand,
+    belief: Belief,
+    sensor: SensorNoise,
+    counts: Iterable[int],
+    *,
+    goal: Goal,
+    rng: np.random.Generator,
+    options: PlannerOptions,
+    prefer: Preference | None = None,
+) -> Plan:
+    """The first number of fingers that some placement can touch with.
+
+    Args:
+        counts: Numbers of fingers, in order.
+        prefer: Puts the ranked candidates in an order of its own; None keeps the ranking's.
+    Raises:
+        NoPlan: No placement with any of them.
+    """
     tools = _tools(hand, options.reach)
     funnel: Funnel = ()
-    for count in range(min(options.fingers_at_once, len(hand.fingers)), 0, -1):
-        found = _best_placement(tools, belief, sensor, goal, options, count, rng)
+    for count in counts:
+        found = _best_placement(tools, belief, sensor, goal, options, count, rng, prefer)
         if isinstance(found, Plan):
             return _with_funnel(found, funnel)
         funnel += found
@@ -156,6 +133,7 @@ def _best_placement(
     options: PlannerOptions,
     count: int,
     rng: np.random.Generator,
+    prefer: Preference | None,
 ) -> Plan | Funnel:
     """The best placement with `count` fingers that reach certifies, or what refused them all."""
     candidates = _candidates(tools, belief.surface, options, count, rng)
@@ -163,23 +141,32 @@ def _best_placement(
     if len(candidates) == 0:
         return funnel
     samples = sample_objects(belief, options.objects, rng=rng)
-    ranking = rank(
-        candidates, belief, samples, sensor, goal,
+    worth = Worth(
+        belief, samples, guarded(sensor, options.offset_guard), goal, options.grasp_height
+    )
+    rank_all = partial(
+        rank, belief=belief, samples=samples, noise=sensor, goal=goal,
         margin=options.margin, offset_guard=options.offset_guard, height=options.grasp_height,
         criterion=options.criterion, rng=rng,
     )  # fmt: skip
+    ranking, scored = rank_all(candidates), 0
+    if options.sweep and count == 3 and options.criterion == "information":
+        more, scored = swept(
+            tools.hand, tools.postures, tools.spheres, candidates, ranking.order[:FROM], worth,
+            cone=options.reach.cone, is_self_free=tools.collision.is_self_free, rng=rng,
+        )  # fmt: skip
+        candidates, ranking = with_swept(candidates, ranking, more, rank_all, tries=options.tries)
+    if prefer is not None:
+        ranking = replace(ranking, order=prefer(candidates, ranking))
     funnel += tuple((f"{count} fingers: singular: {words}", n) for words, n in ranking.rejected)
     solid = _solid(belief.surface)
     failures: dict[str, int] = {}
     for i in ranking.order[: options.tries].tolist():
-        made = _made(tools, belief.surface, solid, candidates, i)
-        if isinstance(made, tuple):
+        made = _made(tools, belief, options, solid, candidates, i)
+        if isinstance(made, _Made):
             refused = tuple((f"{count} fingers: out of reach: {r}", n) for r, n in failures.items())
             plan = _plan(belief.surface, sensor, candidates, ranking, i, made, funnel + refused)
-            worth = Worth(
-                belief, samples, guarded(sensor, options.offset_guard), goal, options.grasp_height
-            )
-            return _judged(plan, worth, ranking, i, options, rng)
+            return _judged(plan, worth, ranking, i, scored, options, rng)
         failures[made] = failures.get(made, 0) + 1
     return funnel + tuple((f"{count} fingers: out of reach: {r}", n) for r, n in failures.items())
 
@@ -189,6 +176,7 @@ def _judged(
     worth: Worth,
     ranking: Ranking,
     i: int,
+    scored: int,
     options: PlannerOptions,
     rng: np.random.Generator,
 ) -> Plan:
@@ -196,7 +184,9 @@ def _judged(
     others = sample_objects(worth.belief, RISK_OBJECTS, rng=rng.spawn(1)[0])
     theta, z = np.array([(probe.place.theta, probe.place.z) for probe in plan.probes]).T
     found = risks(replace(worth, samples=others), theta, z, margin=options.margin)
-    choice = certificate(worth, ranking, i, margin=options.margin) if options.certify else None
+    if not options.certify:
+        return replace(plan, risks=found)
+    choice = certificate(worth, ranking, i, scored=scored, margin=options.margin)
     return replace(plan, risks=found, choice=choice)
 
 
@@ -229,13 +219,14 @@ def _solid(surface: SurfaceOfRevolution) -> RevolvedSolid:
 
 def _made(
     tools: _Tools,
-    surface: SurfaceOfRevolution,
+    belief: Belief,
+    options: PlannerOptions,
     solid: RevolvedSolid,
     candidates: Candidates,
     i: int,
-) -> tuple[Reach, tuple[Approach, ...]] | str:
-    """A certified reach with its approaches, or the reason why there is none."""
-    place = surface.at(candidates.theta[i], candidates.z[i])
+) -> _Made | str:
+    """A certified reach with the ways to it and out, or the reason why there is none."""
+    place = belief.surface.at(candidates.theta[i], candidates.z[i])
     names = tuple(tools.hand.fingers[k].name for k in candidates.fingers[i])
     start = Start(names, candidates.q[i], candidates.base(i))
     several = len(names) > 1
@@ -249,9 +240,13 @@ def _made(
     )
     if isinstance(reach, Unreachable):
         return reach.reason
-    if several:
-        return reach, tuple(plan_approaches(tools.hand, reach))
-    return reach, (approach_by_base(tools.hand, reach),)
+    ways = plan_approaches(tools.hand, reach) if several else (approach_by_base(tools.hand, reach),)
+    X_WB = reach.X_WB if several else ways[0].bases[0]
+    retreat = plan_retreat(
+        tools.hand, tools.spheres, belief, reach.q_standoff, X_WB, np.asarray(place.n)
+    )
+    gentle = tuple(replace(way, force_goal=options.force_goal) for way in ways)
+    return _Made(reach, gentle, retreat)
 
 
 def _plan(
@@ -260,12 +255,12 @@ def _plan(
     candidates: Candidates,
     ranking: Ranking,
     i: int,
-    made: tuple[Reach, tuple[Approach, ...]],
+    made: _Made,
     funnel: Funnel,
 ) -> Plan:
-    reach, approaches = made
+    reach = made.reach
     probes = []
-    for j, approach in enumerate(approaches):
+    for j, approach in enumerate(made.approaches):
         place = Place(float(candidates.theta[i, j]), float(candidates.z[i, j]))
         expected = surface.contact(place, sensor)
         probes.append(Probe(approach.finger, place, expected, reach.q, approach))
@@ -282,6 +277,7 @@ def _plan(
         nearest=ranking.nearest[i],
         label_probability=float(ranking.label_probability[i]),
         funnel=funnel,
+        retreat=made.retreat,
     )
 
 

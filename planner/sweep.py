@@ -10,8 +10,9 @@ collide.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from itertools import combinations
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import combinations, islice
 
 import numpy as np
 
@@ -22,12 +23,15 @@ from hand_models.hand import Hand
 from hand_models.postures import Postures
 from hand_models.spheres import LinkSpheres
 from planner.candidates import END_MARGIN, GAP, Candidates, clear_of_object
+from planner.choice import Ranking
 from planner.prospects import prospects
 from planner.worth import Worth
 
+FROM = 4  # placements, the best of those laid
 PLACES = 16  # of each finger from each placement
 KEPT = 24  # triples of each placement that are ranked
 COLLIDING = 3  # times as many are tested against the object
+LAID = 60  # candidates as laid that are ranked beside them
 _BAND = 0.03  # beyond this from the wall a pad's distance is not asked [m]
 
 
@@ -51,6 +55,7 @@ def swept(
     worth: Worth,
     *,
     cone: float,
+    is_self_free: Callable[[Array], bool],
     rng: np.random.Generator,
 ) -> tuple[Candidates, int]:
     """The best triples from some placements of three fingers, and how many were scored.
@@ -58,6 +63,7 @@ def swept(
     Args:
         candidates, placements: Placements, and which of them to start from.
         cone: Largest angle between pad normal and inward surface normal [rad].
+        is_self_free: Whether joints (nq,) leave the hand free of itself.
         rng: Draws each finger's places where there are more than can be paired.
     """
     surface = worth.belief.surface
@@ -73,8 +79,31 @@ def swept(
         best = triples[_best(triple_scores(own, worth.before, triples), COLLIDING * KEPT)]
         made = _made(hand, postures, candidates, i, reached, best)
         free = clear_of_object(hand, spheres, surface, made.q, made.R_WB, made.p_WB)
-        found.append(made.take(np.flatnonzero(free)[:KEPT]))
+        apart = (k for k in np.flatnonzero(free).tolist() if is_self_free(made.q[k]))
+        found.append(made.take(np.fromiter(islice(apart, KEPT), dtype=np.intp)))
     return joined(found), scored
+
+
+def with_swept(
+    candidates: Candidates,
+    ranking: Ranking,
+    more: Candidates,
+    rank_again: Callable[[Candidates], Ranking],
+    *,
+    tries: int,
+) -> tuple[Candidates, Ranking]:
+    """Candidates as laid and those of the sweep, ranked together.
+
+    Neighbours of the sweep may fail for one reason, so of the tries half are kept for candidates
+    as they were laid.
+    """
+    laid = candidates.take(ranking.order[:LAID])
+    both = joined([laid, more])
+    again = rank_again(both)
+    first = again.order[: tries // 2]
+    others = again.order[(again.order < len(laid)) & ~np.isin(again.order, first)]
+    order = np.concatenate([first, others])
+    return both, replace(again, order=order, rejected=ranking.rejected)
 
 
 def joined(parts: list[Candidates]) -> Candidates:

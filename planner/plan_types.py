@@ -1,0 +1,86 @@
+"""What a plan is: probes of one placement of the hand, with reasons and certificates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from estimator.bounds import AxisBound
+from estimator.contact import Contact
+from estimator.surface import Place
+from estimator.vectors import Array
+from planner.motion import Approach
+from planner.optimum import ChoiceCertificate
+from planner.reach import Reach
+from planner.retreat import Retreat
+from planner.risk import Risk
+
+Funnel = tuple[tuple[str, int], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Probe:
+    """One touch to make.
+
+    Args:
+        finger: Which finger.
+        place: Where on the believed surface.
+        expected: The contact if the object is as believed (first row the parallel's).
+        q: Joint positions with the pad on the contact [rad].
+        approach: The way there, and beyond, should the object be farther away.
+    """
+
+    finger: str
+    place: Place
+    expected: Contact
+    q: Array
+    approach: Approach
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Probes of one placement of the hand, in order, and why these.
+
+    Args:
+        probes: One for each finger that touches.
+        reach: Joint angles and base pose with all pads on their contacts, certified.
+        bound: Worst case of the axis from the best pair of the probes.
+        covariance: Of the axis after the probes, if the object is as believed, (4, 4).
+        angle, offset: Expected error of the axis after them, over the belief [rad], [m].
+        margin: From the nearest singularity, in nine of ten objects; inf below three contacts.
+        nearest: That singularity in words.
+        label_probability: That the labels come out right; NaN where it was not computed.
+        funnel: How many candidates there were, and what refused the others.
+        retreat: The hand's way out after the probes.
+        risks: What is at least 5 % likely to leave the axis untold, the likeliest first.
+        choice: How good these touches are among all that there are; None where not asked.
+    """
+
+    probes: tuple[Probe, ...]
+    reach: Reach
+    bound: AxisBound
+    covariance: Array
+    angle: float
+    offset: float
+    margin: float
+    nearest: str
+    label_probability: float
+    funnel: Funnel
+    retreat: Retreat
+    risks: tuple[Risk, ...] = ()
+    choice: ChoiceCertificate | None = None
+
+
+class NoPlan(Exception):
+    """Nothing that this hand reaches would do.
+
+    Attributes:
+        funnel: What refused the candidates, with counts, in order.
+    """
+
+    def __init__(self, funnel: Funnel) -> None:
+        self.funnel = funnel
+        told = ", ".join(f"{reason} {count}" for reason, count in funnel if count)
+        super().__init__(
+            f"no placement of the hand makes good contacts: {told}. A wider pad cone, a larger "
+            "workspace, or an object nearer to the hand would help"
+        )

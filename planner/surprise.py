@@ -1,0 +1,172 @@
+"""When touches contradict earlier ones: the object moved, or keeps moving.
+
+Contacts before and after a placement of the hand are read apart, each with what was believed
+before any touch. Two axes of one object agree within their covariances, so the squared distance of
+the two in the chart is chi-square with four degrees of freedom; both share the prior and the
+sensor's offsets, which makes the test a cautious one. The fit of all contacts together is the other
+test: it sees what goes on within a placement, and less between them, where the profile gives way.
+
+What is done about it: earlier contacts count only as a belief, widened by the motion; and where
+contacts keep contradicting each other, each counts as worse placed by as much as the object moves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from estimator.axis import Axis, chart_coordinates, chart_lines, to_chart
+from estimator.band import ProfileBand
+from estimator.belief import Belief, update
+from estimator.contact import Contact, Miss
+from estimator.estimate import Hypothesis
+from estimator.prior import AxisPrior
+from estimator.vectors import Array, frozen
+
+ALARM = 0.01  # probability of a false alarm at a placement, by either test
+ONCE_BITTEN = 0.1  # the same after a first alarm, when the next placement has to agree
+MENTIONED = 0.01  # hypotheses that may be the right one
+RESTLESS = 3  # surprises from which the object counts as moving all the time
+LEAST_MOTION = (3e-3, float(np.deg2rad(3.0)))  # rms by which a belief is widened [m], [rad]
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """By how much the object seems to have moved between earlier and later contacts.
+
+    Args:
+        shift: Of the axis beside the middle of what was touched [m].
+        tilt: Of its direction [rad].
+        p_value: How often an object at rest would seem to move as much.
+    """
+
+    shift: float
+    tilt: float
+    p_value: float
+
+    @property
+    def words(self) -> str:
+        return (
+            f"the last contacts put the axis {1e3 * self.shift:.1f} mm and "
+            f"{np.rad2deg(self.tilt):.1f} deg from where the earlier ones had it "
+            f"(p = {self.p_value:.0e}): the object moved, or a reading is wrong"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Learnt:
+    """What is believed, and whether the touches hang together.
+
+    Args:
+        belief: What is held true.
+        settled: Whether the last placement agreed with what was believed before it, once anything
+            contradicted: a goal that is met by touches nobody confirmed does not count.
+        surprise: What the last touches contradicted and what was done; None where nothing.
+        surprises: How often that happened.
+        restless: By how much every contact counts as worse placed [m].
+    """
+
+    belief: Belief
+    settled: bool = True
+    surprise: str | None = None
+    surprises: int = 0
+    restless: float = 0.0
+
+
+def learn(known: Learnt, outcomes: Sequence[Contact | Miss]) -> Learnt:
+    """What is known after one placement's touches, contradictions answered."""
+    felt = tuple(_as_sure(touch, known.restless) for touch in outcomes)
+    belief = update(known.belief, felt)
+    motion = motion_between(known.belief, belief, felt)
+    if motion is None or motion.p_value > (ONCE_BITTEN if known.surprises else ALARM):
+        agreed = known.settled or any(isinstance(touch, Contact) for touch in felt)
+        return replace(known, belief=belief, settled=agreed, surprise=None)
+    surprises, restless = known.surprises + 1, known.restless
+    words = f"{motion.words}. Earlier contacts now count only as a wider prior"
+    if surprises >= RESTLESS:
+        restless = max(restless, motion.shift, LEAST_MOTION[0])
+        felt = tuple(_as_sure(touch, restless) for touch in outcomes)
+        words = f"{words}; it keeps happening, so contacts count as {1e3 * restless:.0f} mm worse"
+    belief = after_motion(known.belief, felt, motion)
+    return Learnt(belief, False, words, surprises, restless)
+
+
+def motion_between(before: Belief, after: Belief, later: Sequence[Contact | Miss]) -> Motion | None:
+    """The motion that later touches show, however little; None where they can show none.
+
+    Args:
+        before: With two contacts or more: fewer say too little of an axis.
+        after: The belief that takes earlier and later touches for those of an object at rest.
+        later: Touches made since.
+    """
+    contacts = [touch for touch in later if isinstance(touch, Contact)]
+    if len(before.contacts) < 2 or not contacts or after.estimate is None:
+        return None
+    alone = update(_untouched(before), contacts)
+    pairs = [
+        _distance(a, b)
+        for a in before.hypotheses
+        for b in alone.hypotheses
+        if min(a.probability, b.probability) > MENTIONED
+    ]
+    if not pairs:
+        return None
+    square, x = min(pairs, key=lambda pair: pair[0])
+    p_value = min(float(chi2.sf(square, 4)), after.estimate.p_value)
+    return Motion(float(np.hypot(*x[:2])), float(np.hypot(*x[2:])), p_value)
+
+
+def _untouched(belief: Belief) -> Belief:
+    """What was believed before any touch."""
+    start = Hypothesis(belief.prior.axis, belief.prior.covariance, 1.0, 0.0, frozen(np.zeros(0)))
+    return Belief(belief.prior, belief.prior_band, (start,), belief.prior_band)
+
+
+def _distance(a: Hypothesis, b: Hypothesis) -> tuple[float, Array]:
+    """Squared distance of two axes in their own deviations, and their difference."""
+    x = to_chart(a.axis, b.axis)
+    total = a.covariance + _carried(a.axis, b)
+    return float(x @ np.linalg.solve(total, x)), x
+
+
+def _carried(reference: Axis, other: Hypothesis) -> Array:
+    """The covariance of another axis in the chart at the reference, by differences."""
+    step = np.sqrt(np.diag(other.covariance)) * 1e-3
+    origin, u = other.axis.point, other.axis.direction
+    lines = chart_lines(origin, u, np.vstack([np.diag(step), -np.diag(step)]))
+    x = chart_coordinates(reference.point, reference.direction, *lines)
+    J = ((x[:4] - x[4:]) / (2.0 * step[:, None])).T
+    return np.asarray(J @ other.covariance @ J.T)
+
+
+def after_motion(before: Belief, later: Sequence[Contact | Miss], motion: Motion) -> Belief:
+    """The belief after the object moved: earlier contacts only as a widened prior."""
+    shift, tilt = max(motion.shift, LEAST_MOTION[0]), max(motion.tilt, LEAST_MOTION[1])
+    widened = before.covariance + 0.5 * np.diag([shift, shift, tilt, tilt]) ** 2
+    prior = AxisPrior(before.axis, widened, before.prior.radius, before.prior.radius_sd)
+    band = _shifted(before.band, shift, tilt)
+    start = Hypothesis(prior.axis, prior.covariance, 1.0, 0.0, frozen(np.zeros(0)))
+    return update(Belief(prior, band, (start,), band), later)
+
+
+def _shifted(band: ProfileBand, shift: float, tilt: float) -> ProfileBand:
+    """The band about an axis that may have moved, the object sliding along it as well."""
+    slope = np.gradient(band.mean, band.z)
+    arm = band.z - band.z.mean()
+    slid = shift**2 * np.outer(slope, slope) + shift**2 + tilt**2 * np.outer(arm, arm)
+    return replace(band, covariance=frozen(band.covariance + slid))
+
+
+def _as_sure(touch: Contact | Miss, by: float) -> Contact | Miss:
+    """The touch with its position less sure by `by` [m] in each coordinate."""
+    if by == 0.0 or isinstance(touch, Miss):
+        return touch
+    contact = touch
+    noise = replace(contact.noise, position=float(np.hypot(contact.noise.position, by)))
+    if contact.covariance is None:
+        return replace(contact, noise=noise)
+    covariance = contact.covariance + np.diag([by**2] * 3 + [0.0] * 5)
+    return replace(contact, noise=noise, covariance=covariance)
