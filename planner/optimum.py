@@ -62,8 +62,8 @@ class ChoiceCertificate:
         """One sentence."""
         return (
             f"expected error {self.chosen:.2f} goals; best of {self.placements + self.scored} "
-            f"within reach {self.reachable:.2f}, were every place in reach {self.optimum:.2f} (best of "
-            f"{self.sets} sets), nowhere below {self.floor:.2f}"
+            f"within reach {self.reachable:.2f}, were every place in reach {self.optimum:.2f} "
+            f"(best of {self.sets} sets), nowhere below {self.floor:.2f}"
         )
 
 

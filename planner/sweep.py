@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import combinations, islice
+from typing import Any
 
 import numpy as np
 
@@ -109,8 +110,10 @@ def with_swept(
 def joined(parts: list[Candidates]) -> Candidates:
     """Candidates of equally many fingers, one after another; what the first rejected."""
     names = ("fingers", "q", "R_WB", "p_WB", "theta", "z", "pad_angle")
-    arrays = [np.concatenate([getattr(part, name) for part in parts]) for name in names]
-    return Candidates(*arrays, parts[0].rejected)
+    arrays: dict[str, Any] = {
+        name: np.concatenate([getattr(part, name) for part in parts]) for name in names
+    }
+    return replace(parts[0], **arrays)
 
 
 def _reached(
@@ -145,7 +148,8 @@ def _near(surface: SurfaceOfRevolution, rho: Array, z: Array) -> Mask:
     """Beside the wall, no farther from the thinnest and thickest place than a pad may be."""
     low, high = surface.profile.z_range
     r = surface.profile.derivatives(np.linspace(low, high, 41))[0]
-    return (z > low) & (z < high) & (rho > r.min()) & (rho < r.max() + _BAND)
+    near = (z > low) & (z < high) & (rho > r.min()) & (rho < r.max() + _BAND)
+    return np.asarray(near)
 
 
 def _triples(finger: Index, fingers: int) -> Index:
