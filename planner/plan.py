@@ -23,7 +23,7 @@ from planner.candidates import Candidates, placement_candidates, single_candidat
 from planner.choice import Ranking, rank
 from planner.goal import Goal
 from planner.motion import Approach, approach_by_base, plan_approaches
-from planner.optimum import certificate
+from planner.optimum import certificate, value_at
 from planner.options import PlannerOptions
 from planner.plan_types import Funnel, NoPlan, Plan, Probe
 from planner.reach import Reach, ReachSolver, Unreachable
@@ -183,10 +183,12 @@ def _judged(
     """The plan with its risks, on objects it was not chosen by, and its certificate."""
     others = sample_objects(worth.belief, RISK_OBJECTS, rng=rng.spawn(1)[0])
     theta, z = np.array([(probe.place.theta, probe.place.z) for probe in plan.probes]).T
-    found = risks(replace(worth, samples=others), theta, z, margin=options.margin)
+    unseen = replace(worth, samples=others)
+    found = risks(unseen, theta, z, margin=options.margin)
     if not options.certify:
         return replace(plan, risks=found)
     choice = certificate(worth, ranking, i, scored=scored, margin=options.margin)
+    choice = replace(choice, unseen=value_at(unseen, theta, z))
     return replace(plan, risks=found, choice=choice)
 
 
