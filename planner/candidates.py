@@ -125,7 +125,7 @@ def _kept(
     for reason, passed in tests:
         rejected.append((reason, int(np.sum(~passed[alive]))))
         alive = alive[passed[alive]]
-    free = _clear_of_object(hand, spheres, surface, q[alive], R_WB[alive], p_WB[alive])
+    free = clear_of_object(hand, spheres, surface, q[alive], R_WB[alive], p_WB[alive])
     rejected.append(("links inside the object", int(np.sum(~free))))
     alive = alive[free]
     return Candidates(
@@ -167,7 +167,7 @@ def _turned_towards(workspace: Workspace, surface: SurfaceOfRevolution, laid: La
     )
 
 
-def _clear_of_object(
+def clear_of_object(
     hand: Hand,
     spheres: LinkSpheres,
     surface: SurfaceOfRevolution,

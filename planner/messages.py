@@ -1,7 +1,8 @@
 """Plans and steps as JSON: SI, radians, joint names, poses as position and quaternion (x, y, z, w).
 
-plan.json holds {"hand", "joint_names", "rounds": [plan, ...]}; the fields of a plan and of its
-probes are those of `plan_record` and `probe_record` below.
+plan.json holds {"hand", "joint_names", "rounds": [plan, ...], "grasp": grasp or null}; the fields
+of a plan and of its probes are those of `plan_record` and `probe_record` below, those of a grasp
+of `grasp_record`.
 """
 
 from __future__ import annotations
@@ -15,17 +16,20 @@ from estimator.contact import Contact, Miss
 from estimator.records import axis_record, contact_record, estimate_record
 from hand_models.hand import Hand
 from planner.explore import Step
+from planner.grasp_outcome import Grasp
 from planner.optimum import ChoiceCertificate
 from planner.plan import Plan, Probe
+from planner.reach import Reach
 
 
-def plan_document(hand: Hand, plans: list[Plan]) -> dict[str, Any]:
-    """All placements that were planned, in order."""
+def plan_document(hand: Hand, plans: list[Plan], grasp: Grasp | None = None) -> dict[str, Any]:
+    """All placements that were planned, in order, and the grasp at the end, if there is one."""
     return {
         "hand": hand.name,
         "joint_names": list(hand.joint_names),
         "units": {"length": "m", "angle": "rad"},
         "rounds": [plan_record(plan) for plan in plans],
+        "grasp": None if grasp is None else grasp_record(hand, grasp),
     }
 
 
@@ -36,14 +40,7 @@ def plan_record(plan: Plan) -> dict[str, Any]:
         "base_pose": pose_record(reach.X_WB),
         "joint_positions": reach.q.tolist(),
         "probes": [probe_record(probe) for probe in plan.probes],
-        "reach": {
-            "position_residual": reach.position_residual,
-            "pad_angle": reach.pad_angle,
-            "joint_limit_margin": reach.limit_margin,
-            "self_clearance": reach.self_clearance,
-            "object_clearance": reach.object_clearance,
-            "solver": reach.solver,
-        },
+        "reach": reach_record(reach),
         "retreat": {
             "joint_positions": plan.retreat.q.tolist(),
             "base_poses": [pose_record(X) for X in plan.retreat.bases],
@@ -65,6 +62,53 @@ def plan_record(plan: Plan) -> dict[str, Any]:
 def _choice_record(choice: ChoiceCertificate) -> dict[str, Any]:
     """Expected errors in goals, null where there is none."""
     return {name: _finite(value) for name, value in vars(choice).items()}
+
+
+def grasp_record(hand: Hand, grasp: Grasp) -> dict[str, Any]:
+    """A grasp: the way in, joint angles open and closed, contacts, and how surely it holds."""
+    return {
+        "hand": hand.name,
+        "joint_names": list(hand.joint_names),
+        "fingers": list(grasp.fingers),
+        "base_pose": pose_record(grasp.X_WB),
+        "approach": [pose_record(X) for X in grasp.approach],
+        "pregrasp_joint_positions": grasp.q_pregrasp.tolist(),
+        "joint_positions": grasp.q_grasp.tolist(),
+        "closing": {
+            "joint_path": grasp.path.tolist(),
+            "contact_index": grasp.contact_index,
+            "before": grasp.closings.before[0].tolist(),
+            "behind": grasp.closings.behind[0].tolist(),
+        },
+        "contacts": [
+            {"finger": finger, "position": p.tolist(), "normal": n.tolist()}
+            for finger, p, n in zip(grasp.fingers, grasp.points, grasp.normals, strict=True)
+        ],
+        "quality": {
+            "force_closure_probability": grasp.probability,
+            "clear_probability": grasp.clear,
+            "samples": grasp.samples,
+            "expected_wrench_margin": grasp.margin,
+            "wrench_margin_5_percent": grasp.margin_5,
+            "wrench_margin_as_believed": grasp.as_believed.margin,
+            "friction": grasp.friction.coefficient,
+            "torque_length": grasp.friction.torque_length,
+        },
+        "reach": reach_record(grasp.reach),
+        "funnel": [{"reason": reason, "count": count} for reason, count in grasp.funnel],
+    }
+
+
+def reach_record(reach: Reach) -> dict[str, Any]:
+    """The certificate of a posture."""
+    return {
+        "position_residual": reach.position_residual,
+        "pad_angle": reach.pad_angle,
+        "joint_limit_margin": reach.limit_margin,
+        "self_clearance": reach.self_clearance,
+        "object_clearance": reach.object_clearance,
+        "solver": reach.solver,
+    }
 
 
 def probe_record(probe: Probe) -> dict[str, Any]:

@@ -35,13 +35,17 @@ MIXED = 2.0  # allowance for moving several coordinates at once
 class ChoiceCertificate:
     """Expected errors after the touches, in goals: 1 is a root mean square of one goal.
 
+    All but `unseen` are of the objects that the touches were chosen by, which favours what was
+    chosen: the best of many thousands on a few objects is partly luck.
+
     Args:
         floor: What no touches anywhere have less than, extrapolated between places (`Optimum`).
         optimum: The best nonsingular set of places, were every place in reach.
-        reachable: The best nonsingular placement of those found for this hand.
+        reachable: The best nonsingular placement of those ranked for this hand.
         chosen: The touches planned.
+        unseen: The touches planned, on objects they were not chosen by; NaN where not asked.
         sets: How many the optimum is the best of.
-        placements: How many the hand's best is the best of.
+        placements: How many were ranked, after `scored` triples within reach of the best ones.
     """
 
     floor: float
@@ -50,6 +54,8 @@ class ChoiceCertificate:
     chosen: float
     sets: int
     placements: int
+    scored: int
+    unseen: float = np.nan
 
     @property
     def excess(self) -> float:
@@ -60,14 +66,21 @@ class ChoiceCertificate:
     def words(self) -> str:
         """One sentence."""
         return (
-            f"expected error {self.chosen:.2f} goals; best of {self.placements} placements "
-            f"{self.reachable:.2f}, were every place in reach {self.optimum:.2f} (best of "
-            f"{self.sets} sets), nowhere below {self.floor:.2f}"
+            f"expected error {self.chosen:.2f} goals ({self.unseen:.2f} on "
+            f"other objects); best of {self.placements + self.scored} "
+            f"within reach {self.reachable:.2f}, were every place in reach {self.optimum:.2f} "
+            f"(best of {self.sets} sets), nowhere below {self.floor:.2f}"
         )
 
 
-def certificate(worth: Worth, ranking: Ranking, i: int, *, margin: float) -> ChoiceCertificate:
-    """Of the ranking's candidate i among its like and among all places there are."""
+def certificate(
+    worth: Worth, ranking: Ranking, i: int, *, margin: float, scored: int = 0
+) -> ChoiceCertificate:
+    """Of the ranking's candidate i among its like and among all places there are.
+
+    Args:
+        scored: How many triples the ranked ones were the best of.
+    """
     kept = ranking.margin >= margin
     best = best_touches(worth, place_grid(worth.belief.surface), ranking.touches, margin=margin)
     return ChoiceCertificate(
@@ -77,6 +90,7 @@ def certificate(worth: Worth, ranking: Ranking, i: int, *, margin: float) -> Cho
         chosen=float(ranking.value[i]),
         sets=best.sets,
         placements=int(kept.sum()),
+        scored=scored,
     )
 
 
@@ -164,6 +178,13 @@ def refined(worth: Worth, optimum: Optimum, grid: Grid, *, margin: float) -> flo
     order = np.argsort(scores, kind="stable")
     best = _first_nonsingular(worth, landed, sets[order], margin)
     return np.inf if best is None else float(np.exp(scores[order[best]]))
+
+
+def value_at(worth: Worth, theta: Array, z: Array) -> float:
+    """Expected error after touches at places (m,), in goals."""
+    place = worth.belief.surface.at(theta[None], z[None])
+    after = worth.covariances(prospects(worth.samples, place.p, place.n))[:, 0]
+    return float(np.exp(0.5 * np.log(np.einsum("bii->b", after)).mean()))
 
 
 def _land(worth: Worth, theta: Array, z: Array) -> Prospects:

@@ -31,6 +31,8 @@ class PlannerOptions:
         criterion: By what placements are put in order: `planner.criteria` says what each means.
         grasp_height: Where along the believed axis the offset counts, from its point: the place
             of the later grasp [m].
+        sweep: Whether every triple that the fingers reach from the best placements is scored, too
+            (`planner.sweep`); criterion `information` only.
         certify: Whether a plan says how good it is among all touches that there are.
         force_goal: At which a touching finger stops [N].
     """
@@ -38,12 +40,13 @@ class PlannerOptions:
     reach: ReachOptions = field(default_factory=lambda: ReachOptions(starts=0, rescues=1))
     fingers_at_once: int = 3
     margin: float = MARGIN
-    placements: int = 1200
+    placements: int = 600
     objects: int = 20
     tries: int = 24
     offset_guard: float = OFFSET_GUARD
     criterion: Criterion = "information"
     grasp_height: float = 0.0
+    sweep: bool = True
     certify: bool = True
     force_goal: float = FORCE_GOAL
 

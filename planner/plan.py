@@ -15,6 +15,7 @@ from estimator.bounds import AxisBound
 from estimator.contact import SensorNoise
 from estimator.surface import Place, SurfaceOfRevolution
 from estimator.vectors import Index, frozen
+from hand_models.collision import HandCollision
 from hand_models.hand import Hand
 from hand_models.postures import Postures, posture_library
 from hand_models.spheres import LinkSpheres, link_spheres
@@ -22,7 +23,7 @@ from planner.candidates import Candidates, placement_candidates, single_candidat
 from planner.choice import Ranking, rank
 from planner.goal import Goal
 from planner.motion import Approach, approach_by_base, plan_approaches
-from planner.optimum import certificate
+from planner.optimum import certificate, value_at
 from planner.options import PlannerOptions
 from planner.plan_types import Funnel, NoPlan, Plan, Probe
 from planner.reach import Reach, ReachSolver, Unreachable
@@ -31,6 +32,7 @@ from planner.retreat import Retreat, plan_retreat
 from planner.risk import risks
 from planner.solid import RevolvedSolid
 from planner.starts import Start
+from planner.sweep import FROM, swept, with_swept
 from planner.worth import Worth, guarded
 
 __all__ = ["NoPlan", "Plan", "Probe", "plan_preferred", "plan_probes"]
@@ -48,6 +50,7 @@ class _Tools:
     hand: Hand
     postures: Postures
     spheres: LinkSpheres
+    collision: HandCollision
     solver: ReachSolver
 
 
@@ -61,7 +64,10 @@ class _Made(NamedTuple):
 
 @lru_cache(maxsize=8)
 def _tools(hand: Hand, options: ReachOptions) -> _Tools:
-    return _Tools(hand, posture_library(hand), link_spheres(hand), ReachSolver(hand, options))
+    return _Tools(
+        hand, posture_library(hand), link_spheres(hand), HandCollision(hand),
+        ReachSolver(hand, options),
+    )  # fmt: skip
 
 
 def plan_probes(
@@ -135,11 +141,21 @@ def _best_placement(
     if len(candidates) == 0:
         return funnel
     samples = sample_objects(belief, options.objects, rng=rng)
-    ranking = rank(
-        candidates, belief, samples, sensor, goal,
+    worth = Worth(
+        belief, samples, guarded(sensor, options.offset_guard), goal, options.grasp_height
+    )
+    rank_all = partial(
+        rank, belief=belief, samples=samples, noise=sensor, goal=goal,
         margin=options.margin, offset_guard=options.offset_guard, height=options.grasp_height,
         criterion=options.criterion, rng=rng,
     )  # fmt: skip
+    ranking, scored = rank_all(candidates), 0
+    if options.sweep and count == 3 and options.criterion == "information":
+        more, scored = swept(
+            tools.hand, tools.postures, tools.spheres, candidates, ranking.order[:FROM], worth,
+            cone=options.reach.cone, is_self_free=tools.collision.is_self_free, rng=rng,
+        )  # fmt: skip
+        candidates, ranking = with_swept(candidates, ranking, more, rank_all, tries=options.tries)
     if prefer is not None:
         ranking = replace(ranking, order=prefer(candidates, ranking))
     funnel += tuple((f"{count} fingers: singular: {words}", n) for words, n in ranking.rejected)
@@ -150,10 +166,7 @@ def _best_placement(
         if isinstance(made, _Made):
             refused = tuple((f"{count} fingers: out of reach: {r}", n) for r, n in failures.items())
             plan = _plan(belief.surface, sensor, candidates, ranking, i, made, funnel + refused)
-            worth = Worth(
-                belief, samples, guarded(sensor, options.offset_guard), goal, options.grasp_height
-            )
-            return _judged(plan, worth, ranking, i, options, rng)
+            return _judged(plan, worth, ranking, i, scored, options, rng)
         failures[made] = failures.get(made, 0) + 1
     return funnel + tuple((f"{count} fingers: out of reach: {r}", n) for r, n in failures.items())
 
@@ -163,14 +176,19 @@ def _judged(
     worth: Worth,
     ranking: Ranking,
     i: int,
+    scored: int,
     options: PlannerOptions,
     rng: np.random.Generator,
 ) -> Plan:
     """The plan with its risks, on objects it was not chosen by, and its certificate."""
     others = sample_objects(worth.belief, RISK_OBJECTS, rng=rng.spawn(1)[0])
     theta, z = np.array([(probe.place.theta, probe.place.z) for probe in plan.probes]).T
-    found = risks(replace(worth, samples=others), theta, z, margin=options.margin)
-    choice = certificate(worth, ranking, i, margin=options.margin) if options.certify else None
+    unseen = replace(worth, samples=others)
+    found = risks(unseen, theta, z, margin=options.margin)
+    if not options.certify:
+        return replace(plan, risks=found)
+    choice = certificate(worth, ranking, i, scored=scored, margin=options.margin)
+    choice = replace(choice, unseen=value_at(unseen, theta, z))
     return replace(plan, risks=found, choice=choice)
 
 

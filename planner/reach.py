@@ -62,7 +62,7 @@ class ReachSolver:
         """Find a hand pose that makes the contacts.
 
         Args:
-            points: (k, 3) surface points, one to three, in the world [m].
+            points: (k, 3) surface points, one for each finger at most, in the world [m].
             normals: (k, 3) outward unit normals there.
             solid: The believed object; links stay out of it.
             fingers: The finger of each contact; None tries all assignments.
@@ -74,7 +74,8 @@ class ReachSolver:
             ValueError: Shapes, lengths of normals, or a finger used twice.
             HandError: A finger the hand has not.
         """
-        task = ReachTask(*_contacts(points, normals), solid, self.options)
+        contacts = _contacts(points, normals, most=len(self.hand.fingers))
+        task = ReachTask(*contacts, solid, self.options)
         named = None if fingers is None else self._checked_fingers(fingers, len(task.points))
         failed: list[Solution] = []
         used: list[Start] = []
@@ -177,10 +178,12 @@ class ReachSolver:
         return np.array([self.hand.fingers[i].pad_radius for i in fingers])
 
 
-def _contacts(points: ArrayLike, normals: ArrayLike) -> tuple[Array, Array]:
+def _contacts(points: ArrayLike, normals: ArrayLike, *, most: int) -> tuple[Array, Array]:
     p, n = _frozen(points), _frozen(normals)
-    if p.ndim != 2 or p.shape != n.shape or p.shape[1] != 3 or not 1 <= len(p) <= 3:
-        raise ValueError(f"points and normals must be (k, 3), k 1 to 3, got {p.shape}, {n.shape}")
+    if p.ndim != 2 or p.shape != n.shape or p.shape[1] != 3 or not 1 <= len(p) <= most:
+        raise ValueError(
+            f"points and normals must be (k, 3), k 1 to {most}, got {p.shape}, {n.shape}"
+        )
     if not np.isfinite(p).all():
         raise ValueError("points must be finite")
     if not np.all(np.abs(np.linalg.norm(n, axis=1) - 1.0) < _UNIT_TOLERANCE):

@@ -2,6 +2,8 @@
 
 Comparisons
     touches      contacts the planner chose against random contacts the same hand reaches
+    choice       the choice of contacts against what is possible, criteria side by side
+    grasps       grasps held on the true object, after touching and from the prior alone
     loops        whole sessions to a goal, from raw signals and from readings with noise
     readers      raw signals read, beside a straightforward implementation
     estimators   our estimator against others on the same contacts, accuracy and time as ratios
@@ -35,16 +37,22 @@ from typing import Annotated
 for library in ("OMP", "OPENBLAS", "MKL", "NUMBA"):  # one core; read when numpy is first imported
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
+import benchmark_choice  # noqa: E402
 import benchmark_estimators  # noqa: E402
 import benchmark_loops  # noqa: E402
 import benchmark_readers  # noqa: E402
 import benchmark_touches  # noqa: E402
+import grasp_study  # noqa: E402
 import tyro  # noqa: E402
 from tyro.conf import subcommand  # noqa: E402
 
 Touches = Annotated[
     benchmark_touches.Options, subcommand("touches", description=benchmark_touches.__doc__)
 ]
+Choice = Annotated[
+    benchmark_choice.Options, subcommand("choice", description=benchmark_choice.__doc__)
+]
+Grasps = Annotated[grasp_study.Options, subcommand("grasps", description=grasp_study.__doc__)]
 Loops = Annotated[benchmark_loops.Options, subcommand("loops", description=benchmark_loops.__doc__)]
 Readers = Annotated[
     benchmark_readers.Options, subcommand("readers", description=benchmark_readers.__doc__)
@@ -56,10 +64,15 @@ Estimators = Annotated[
 
 
 def main() -> int:
-    options = tyro.cli(Touches | Loops | Readers | Estimators, description=__doc__)
+    commands = Touches | Choice | Grasps | Loops | Readers | Estimators
+    options = tyro.cli(commands, description=__doc__)
     match options:
         case benchmark_touches.Options():
             return benchmark_touches.main(options)
+        case benchmark_choice.Options():
+            return benchmark_choice.main(options)
+        case grasp_study.Options():
+            return grasp_study.main(options)
         case benchmark_loops.Options():
             return benchmark_loops.main(options)
         case benchmark_readers.Options():

@@ -14,7 +14,7 @@ from estimator.readers.raw_sensors import DepthPad, raw_sensor
 from estimator.surface import SurfaceOfRevolution
 from planner.explore import Step
 from planner.plan import Probe
-from sim_sensor.episode import Act, BelievedAxis, Episode
+from sim_sensor.episode import Act, BelievedAxis, Episode, Grip
 from sim_sensor.feeling import Felt
 from sim_sensor.pictures import Signal
 from sim_sensor.world import World
@@ -74,9 +74,14 @@ def _shown(sensor: str, felt: Felt | None) -> Signal | None:
 
 
 def episode_of(
-    surface: SurfaceOfRevolution, world: World, steps: list[Step], conclusion: str, sensor: str = ""
+    surface: SurfaceOfRevolution,
+    world: World,
+    steps: list[Step],
+    conclusion: str,
+    sensor: str = "",
+    grip: Grip | None = None,
 ) -> Episode:
-    """Each touch with the belief just before and just after it."""
+    """Each touch with the belief just before and just after it, and the grip at the end."""
     acts: list[Act] = []
     for step in steps:
         belief = step.before
@@ -97,7 +102,7 @@ def episode_of(
                 )
             )
             belief = after
-    return Episode(surface, tuple(acts), conclusion=conclusion)
+    return Episode(surface, tuple(acts), conclusion=conclusion, grip=grip)
 
 
 def raw_touches(sensor: str, steps: list[Step], world: World) -> RawTouches | None:

@@ -1,12 +1,13 @@
-"""Plan three touches with a real hand, feel them, and find the axis of an unknown object.
+"""Touch an unknown object with a real hand, find its axis, and plan a grasp around it.
 
 A coarse camera is rehearsed: it believes an axis, a radius and a height, all somewhat wrong. The
 hand plans three contacts it can make, touches the true object (which the planner never sees),
-estimates the axis with its uncertainty, and touches again until the goal is met.
+estimates the axis with its uncertainty, and touches again until the goal is met. Then it plans a
+grasp of three or four fingers around the axis and says how surely it holds.
 
-Writes plan.json (every placement with joint angles and approaches), result.json (estimate, truth,
-one entry per round), probes.html (the animated hand, no server needed) and, for a sensor of raw
-signals, raw.npz (what it reported; estimate_axis.py --raw reads it) into --out.
+Writes plan.json (every placement with joint angles and approaches, and the grasp), result.json
+(estimate, truth, one entry per round), probes.html (the animated hand, no server needed) and, for a
+sensor of raw signals, raw.npz (what it reported; estimate_axis.py --raw reads it) into --out.
 
 Exit status: 0 goal met, 1 not met (and why), 2 bad input or an object out of the hand's reach.
 
@@ -27,6 +28,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import tyro
+from grasp_ending import Ending, ending, ending_record, grip_of, print_ending
 from grasp_report import episode_of, print_round, raw_touches
 from output_files import require_writable, write_whole
 from rich.console import Console
@@ -43,6 +45,7 @@ from hand_models import HandError, load_hand
 from hand_models.hand import Hand
 from planner.explore import Step, explore
 from planner.goal import Goal
+from planner.grasp import Friction, GraspOptions
 from planner.messages import plan_document, step_record
 from planner.options import PlannerOptions
 from planner.plan import NoPlan, Probe
@@ -83,6 +86,11 @@ class Options:
     """How far from there, along each axis, the arm can go; it turns the hand any way."""
     budget: int = 15
     """Largest number of touches."""
+    grasp_heights_mm: tuple[float, float] | None = None
+    """Lowest and highest contact of the grasp, along the believed axis from the object's believed
+    middle. Not given, anywhere but the ends."""
+    friction: float = 0.5
+    """Coefficient of friction between fingertips and object."""
     seed: int = 0
     """Of everything random: the object's pose, the camera's error, the sensor's noise."""
     out: Path = Path("out")
@@ -100,6 +108,7 @@ class Scenario:
     hand: Hand
     goal: Goal
     planner: PlannerOptions
+    grasp: GraspOptions
 
 
 def main() -> int:
@@ -150,6 +159,7 @@ def _scenario(options: Options) -> Scenario:
         hand=load_hand(options.hand),
         goal=Goal(np.deg2rad(options.goal_angle_deg), 1e-3 * options.goal_offset_mm),
         planner=_planner_options(options),
+        grasp=_grasp_options(options),
     )
 
 
@@ -170,6 +180,22 @@ def _planner_options(options: Options) -> PlannerOptions:
     workspace = Workspace(X_WB, 1e-3 * options.wrist_range_mm, np.pi)
     reach = replace(PlannerOptions().reach, workspace=workspace)
     return PlannerOptions(reach=reach)
+
+
+def _grasp_options(options: Options) -> GraspOptions:
+    """The defaults, within the arm's workspace, at the user's heights."""
+    heights = options.grasp_heights_mm
+    if heights is not None and not heights[0] < heights[1]:
+        raise ValueError(f"--grasp-heights-mm: expected low < high, got {heights}")
+    if not (np.isfinite(options.friction) and options.friction > 0.0):
+        raise ValueError(f"--friction: expected a number > 0, got {options.friction}")
+    default = GraspOptions()
+    return replace(
+        default,
+        reach=replace(default.reach, workspace=_planner_options(options).reach.workspace),
+        heights=None if heights is None else (1e-3 * heights[0], 1e-3 * heights[1]),
+        friction=Friction(options.friction),
+    )
 
 
 def _rounds(scenario: Scenario, options: Options, console: Console) -> Iterator[Step]:
@@ -215,6 +241,12 @@ def _conclude(
     )
     missing = scenario.goal.missing(belief) or unconfirmed
     reason = "" if met else reason or f"budget spent: {missing}"
+    rng = np.random.default_rng([options.seed, 2])
+    end = Ending()
+    if met:
+        with console.status("planning the grasp ..."):
+            end = ending(scenario.hand, belief, scenario.surface, scenario.grasp, rng=rng)
+        print_ending(console, end)
     result = {
         "goal_met": met,
         "reason": reason,
@@ -229,15 +261,19 @@ def _conclude(
         "error": error,
         "goal": {"angle_deg": options.goal_angle_deg, "offset_mm": options.goal_offset_mm},
         "rounds": [step_record(step) for step in steps],
+        "grasp": ending_record(end),
     }
-    document = plan_document(scenario.hand, [step.plan for step in steps])
+    document = plan_document(scenario.hand, [step.plan for step in steps], end.grasp)
     plans = json.dumps(document, indent=1, allow_nan=False)
     told = json.dumps(result, indent=1, allow_nan=False)
     try:
         options.out.mkdir(parents=True, exist_ok=True)
         if steps:
             words = f"{error['angle_deg']:.2f} deg and {error['offset_mm']:.2f} mm from the truth"
-            episode = episode_of(scenario.surface, scenario.world, steps, words, options.sensor)
+            episode = episode_of(
+                scenario.surface, scenario.world, steps, words, options.sensor,
+                grip_of(scenario.hand, end),
+            )  # fmt: skip
             write_page(options.out / "probes.html", scenario.hand, episode)
         write_whole(options.out / "plan.json", f"{plans}\n".encode())
         write_whole(options.out / "result.json", f"{told}\n".encode())

@@ -116,6 +116,31 @@ class Act:
 
 
 @dataclass(frozen=True, eq=False)
+class Grip:
+    """The hand comes in open and closes around the object, at the end.
+
+    Args:
+        path: Configurations of the whole hand, in order, shape (K, nq).
+        bases: Pose of the hand base in the world for each (`X_WB`).
+        words: Shown with the caption.
+    Raises:
+        ValueError: Shapes that do not fit, or not finite.
+    """
+
+    path: Array
+    bases: tuple[pin.SE3, ...]
+    words: str = ""
+
+    def __post_init__(self) -> None:
+        path = frozen(self.path)
+        if path.ndim != 2 or len(path) < 2 or not np.all(np.isfinite(path)):
+            raise ValueError(f"grip path: expected finite numbers (K, nq), got {path.shape}")
+        if len(self.bases) != len(path):
+            raise ValueError(f"grip bases: expected {len(path)} poses, got {len(self.bases)}")
+        object.__setattr__(self, "path", path)
+
+
+@dataclass(frozen=True, eq=False)
 class Episode:
     """Everything that is shown on one page.
 
@@ -124,6 +149,7 @@ class Episode:
         acts: In order, at least one.
         title: Heading of the page.
         conclusion: Shown when all is over.
+        grip: How the object is taken hold of at last; None where it is not.
     Raises:
         ValueError: No act.
     """
@@ -132,6 +158,7 @@ class Episode:
     acts: tuple[Act, ...]
     title: str = "Finding an axis by touch"
     conclusion: str = ""
+    grip: Grip | None = None
 
     def __post_init__(self) -> None:
         if not self.acts:

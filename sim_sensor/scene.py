@@ -17,7 +17,7 @@ from estimator.vectors import Array, frozen, unit
 from hand_models.hand import Hand
 from sim_sensor.episode import Act, BelievedAxis, Episode
 from sim_sensor.meshes import lathe_mesh, link_mesh, tube_mesh
-from sim_sensor.timeline import Beat, Posture, postures, schedule
+from sim_sensor.timeline import Beat, Posture, end_of, postures, schedule
 from sim_sensor.viewer_commands import (
     Command,
     set_ball,
@@ -102,7 +102,7 @@ class Scene:
 def build_scene(hand: Hand, episode: Episode) -> Scene:
     """The hand, the true object as a ghost, beliefs and contacts, with their times."""
     beats = schedule(episode.acts)
-    duration = beats[-1].end + 2.0
+    duration = end_of(episode, beats) + 2.0
     frames = postures(hand.model, episode, beats)
     stage = [*_room(), *_links(hand), *_truth(episode)]
     tracks = [*_hand_tracks(hand, frames)]

@@ -13,6 +13,7 @@ from sim_sensor.episode import Act, Episode
 
 LOOK, MOVE, STAY, APPROACH, FEEL, RETREAT = 1.5, 1.6, 0.5, 1.8, 2.6, 1.2  # durations [s]
 STEPS = 10  # postures of an approach; straight in the joints between them
+GRIP = 4.0  # from the first posture of a grip to the last [s]
 LIFT = 0.10  # how far the hand moves aside when it is laid anew [m]
 
 
@@ -77,8 +78,26 @@ def postures(model: pin.Model, episode: Episode, beats: tuple[Beat, ...]) -> tup
         for s in there:
             time = beat.retreat + s * (beat.end - beat.retreat)
             frames.append(Posture(time, *act.posture(model, (1.0 - s) * act.stop)))
+    frames += _grip(model, episode, frames[-1])
     first = frames[0]
     return (Posture(0.0, first.q, first.X_WB), *frames)
+
+
+def end_of(episode: Episode, beats: tuple[Beat, ...]) -> float:
+    """When the last motion ends [s]."""
+    return beats[-1].end + (MOVE + GRIP if episode.grip else 0.0)
+
+
+def _grip(model: pin.Model, episode: Episode, last: Posture) -> list[Posture]:
+    """The hand swings to the grip's first posture, comes in and closes."""
+    if episode.grip is None:
+        return []
+    times = last.time + MOVE + np.linspace(0.0, GRIP, len(episode.grip.path))
+    frames = [
+        Posture(float(time), q, X_WB)
+        for time, q, X_WB in zip(times, episode.grip.path, episode.grip.bases, strict=True)
+    ]
+    return _moves(model, last, frames[0], episode.centre) + frames
 
 
 def captions(episode: Episode, beats: tuple[Beat, ...]) -> list[dict[str, object]]:
@@ -94,8 +113,10 @@ def captions(episode: Episode, beats: tuple[Beat, ...]) -> list[dict[str, object
         lines.append(_caption(beat.touch, doing[1], "\n".join(line for line in learnt if line)))
         lines.append(_caption(beat.retreat, f"{name} goes back", f"believed axis: {after}"))
     last = _sureness(episode, episode.acts[-1], 1)
+    if episode.grip:
+        lines.append(_caption(beats[-1].end, "The grasp", episode.grip.words))
     end = "\n".join(line for line in (f"believed axis: {last}", episode.conclusion) if line)
-    lines.append(_caption(beats[-1].end, "Done", end))
+    lines.append(_caption(end_of(episode, beats), "Done", end))
     return lines
 
 

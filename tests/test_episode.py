@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from episodes import TRUE_AXIS, episode_of
 
 from estimator.axis import from_chart, to_chart
 from estimator.vectors import basis_across
 from hand_models.hand import Hand, load_hand
-from sim_sensor.episode import Act, BelievedAxis, Episode
+from sim_sensor.episode import Act, BelievedAxis, Episode, Grip
 from sim_sensor.meshes import tube_mesh
-from sim_sensor.timeline import postures, schedule
+from sim_sensor.timeline import captions, end_of, postures, schedule
 from sim_sensor.view import write_page
 
 
@@ -62,6 +64,25 @@ def test_the_hand_never_jumps(hand: Hand, episode: Episode) -> None:
         assert b.time >= a.time
         speed = np.linalg.norm(b.X_WB.translation - a.X_WB.translation)
         assert speed <= 0.8 * (b.time - a.time) + 1e-9
+
+
+def test_a_grip_follows_the_last_act_without_a_jump(hand: Hand, episode: Episode) -> None:
+    act = episode.acts[-1]
+    bases = tuple(pin.SE3(act.bases[0].rotation, act.bases[0].translation + x)
+                  for x in np.linspace(0.05, 0.0, 6)[:, None] * [0.0, 0.0, 1.0])  # fmt: skip
+    gripped = replace(episode, grip=Grip(act.path, bases, "closing"))
+    beats = schedule(gripped.acts)
+    frames = postures(hand.model, gripped, beats)
+    assert frames[-1].time == pytest.approx(end_of(gripped, beats))
+    np.testing.assert_allclose(frames[-1].q, act.path[-1])
+    for a, b in pairwise(frames):
+        assert b.time >= a.time
+        speed = np.linalg.norm(b.X_WB.translation - a.X_WB.translation)
+        assert speed <= 0.8 * (b.time - a.time) + 1e-9
+    heads = [line["head"] for line in captions(gripped, beats)]
+    assert heads[-2:] == ["The grasp", "Done"]
+    with pytest.raises(ValueError, match="grip bases: expected 6 poses, got 2"):
+        Grip(act.path, bases[:2])
 
 
 def test_a_finger_stops_between_the_points_of_its_path(hand: Hand, episode: Episode) -> None:

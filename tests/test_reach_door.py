@@ -28,7 +28,7 @@ COLLISION = HandCollision(HAND)
     [
         ([[0, 0, 0]], [[0, 0, 2]], None, ValueError, "unit vectors"),
         ([[0, 0, np.nan]], [[0, 0, 1]], None, ValueError, "finite"),
-        (np.zeros((4, 3)), np.zeros((4, 3)), None, ValueError, "k 1 to 3"),
+        (np.zeros((5, 3)), np.zeros((5, 3)), None, ValueError, "k 1 to 4"),
         ([0, 0, 0], [0, 0, 1], None, ValueError, r"\(k, 3\)"),
         ([[0, 0, 0]] * 2, [[0, 0, 1]] * 2, ["index"] * 2, ValueError, "2 different fingers"),
         ([[0, 0, 0]], [[0, 0, 1]], ["little"], HandError, "its fingers are index"),
