@@ -40,13 +40,13 @@ class PlannerOptions:
     reach: ReachOptions = field(default_factory=lambda: ReachOptions(starts=0, rescues=1))
     fingers_at_once: int = 3
     margin: float = MARGIN
-    placements: int = 600
+    placements: int = 1200
     objects: int = 20
     tries: int = 24
     offset_guard: float = OFFSET_GUARD
     criterion: Criterion = "information"
     grasp_height: float = 0.0
-    sweep: bool = True
+    sweep: bool = False
     certify: bool = True
     force_goal: float = FORCE_GOAL
 
