@@ -18,6 +18,7 @@ from hand_models.postures import Postures, posture_library
 from hand_models.spheres import LinkSpheres, link_spheres
 from planner.candidates import Candidates, placement_candidates
 from planner.closing import Bodies, bodies_of, body_of
+from planner.funnel import Funnel
 from planner.grasp_hold import CLOSED, Closings, Friction, holds
 from planner.grasp_motion import (
     BEFORE,
@@ -27,7 +28,7 @@ from planner.grasp_motion import (
     way_in,
 )
 from planner.grasp_options import GraspOptions
-from planner.grasp_outcome import Funnel, Grasp, Hold, NoGrasp, closes_on, hold_on
+from planner.grasp_outcome import Grasp, Hold, NoGrasp, closes_on, hold_on
 from planner.motion import Approach, plan_approaches
 from planner.reach import Reach, ReachSolver, Unreachable
 from planner.reach_task import ReachOptions

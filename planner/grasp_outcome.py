@@ -10,10 +10,9 @@ import pinocchio as pin
 from estimator.surface import SurfaceOfRevolution
 from estimator.vectors import Array
 from planner.closing import body_of
+from planner.funnel import Funnel, in_words
 from planner.grasp_hold import Closings, Friction, holds
 from planner.reach import Reach
-
-Funnel = tuple[tuple[str, int], ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,10 +102,9 @@ class NoGrasp(Exception):
 
     def __init__(self, funnel: Funnel) -> None:
         self.funnel = funnel
-        told = ", ".join(f"{reason} {count}" for reason, count in funnel if count)
         super().__init__(
-            f"no grasp of the believed object: {told}. More friction, other heights, a larger "
-            "workspace, or an axis that is better known would help"
+            f"no grasp of the believed object: {in_words(funnel)}. More friction, other heights, "
+            "a larger workspace, or an axis that is better known would help"
         )
 
 

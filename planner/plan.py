@@ -21,11 +21,12 @@ from hand_models.postures import Postures, posture_library
 from hand_models.spheres import LinkSpheres, link_spheres
 from planner.candidates import Candidates, placement_candidates, single_candidates
 from planner.choice import Ranking, rank
+from planner.funnel import Funnel
 from planner.goal import Goal
 from planner.motion import Approach, approach_by_base, plan_approaches
 from planner.optimum import certificate, value_at
 from planner.options import PlannerOptions
-from planner.plan_types import Funnel, NoPlan, Plan, Probe
+from planner.plan_types import NoPlan, Plan, Probe
 from planner.reach import Reach, ReachSolver, Unreachable
 from planner.reach_task import ReachOptions
 from planner.retreat import Retreat, plan_retreat

@@ -8,13 +8,12 @@ from estimator.bounds import AxisBound
 from estimator.contact import Contact
 from estimator.surface import Place
 from estimator.vectors import Array
+from planner.funnel import Funnel, in_words
 from planner.motion import Approach
 from planner.optimum import ChoiceCertificate
 from planner.reach import Reach
 from planner.retreat import Retreat
 from planner.risk import Risk
-
-Funnel = tuple[tuple[str, int], ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,8 +78,7 @@ class NoPlan(Exception):
 
     def __init__(self, funnel: Funnel) -> None:
         self.funnel = funnel
-        told = ", ".join(f"{reason} {count}" for reason, count in funnel if count)
         super().__init__(
-            f"no placement of the hand makes good contacts: {told}. A wider pad cone, a larger "
-            "workspace, or an object nearer to the hand would help"
+            f"no placement of the hand makes good contacts: {in_words(funnel)}. A wider pad "
+            "cone, a larger workspace, or an object nearer to the hand would help"
         )

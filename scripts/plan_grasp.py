@@ -216,7 +216,7 @@ def _rounds(scenario: Scenario, options: Options, console: Console) -> Iterator[
         rng=np.random.default_rng([options.seed, 1]),
     )
     while True:
-        with console.status("planning and touching ..."):
+        with console.status("planning and touching (the first time, compiling for a minute) ..."):
             step = next(steps, None)
         if step is None:
             return
