@@ -1,15 +1,18 @@
 """The final check: exact distances between convex hulls, by coal.
 
-Every visual mesh is replaced by its convex hull and every pad by its sphere; what a tip's mesh
-shows inside the pad's sphere is dropped, so that a tip is round where it touches. The optimiser
-works on other shapes (`hand_models.spheres`), so this check is independent of it.
+Every visual mesh is replaced by its convex hull. Towards an object every pad is its sphere, and
+what a tip's mesh shows inside that sphere is dropped, so that a tip is round where it touches.
+Towards other links a tip is its whole hull: a sphere that fits the front of a slim tip stands out
+of its sides. The optimiser works on other shapes (`hand_models.spheres`), so this check is
+independent of it.
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import coal
 import numpy as np
@@ -17,7 +20,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from hand_models.geometry import link_points, pad_in_joint
-from hand_models.hand import Hand, HandError
+from hand_models.hand import Finger, Hand, HandError
 
 Array = NDArray[np.float64]
 
@@ -63,11 +66,13 @@ class HandCollision:
 
     def __init__(self, hand: Hand) -> None:
         self.hand = hand
-        self._shapes, self._pad_ids = _convex_shapes(hand)
-        for i, j in _pairs(hand.model, self._shapes):
+        shapes = _Shapes(hand)
+        self._shapes, self._outer, self._pad_ids = shapes.model, shapes.outer, shapes.pads
+        for i, j in _pairs(hand.model, shapes.model, shapes.inner):
             self._shapes.addCollisionPair(pin.CollisionPair(i, j))
         self._data = hand.model.createData()
         self._shape_data = pin.GeometryData(self._shapes)
+        _start_afresh(self._shape_data)
 
     def is_self_free(self, q: ArrayLike) -> bool:
         """Whether no two links overlap; stops at the first that do."""
@@ -106,10 +111,12 @@ class HandCollision:
             self.hand.model, self._data, self._shapes, self._shape_data, np.asarray(q)
         )
         X_BO = X_WB.inverse() * X_WO
-        distances = np.array([self._to_object(i, slices, X_BO) for i in range(self._shapes.ngeoms)])
-        links = [i for i in range(self._shapes.ngeoms) if i not in self._pad_ids]
-        names = tuple(self._link(i) for i in links)
-        return ObjectClearance(names, distances[links], distances[list(self._pad_ids)])
+        links = [i for i in self._outer if i not in self._pad_ids]
+        distances, pads = (
+            np.array([self._to_object(i, slices, X_BO) for i in ids])
+            for ids in (links, self._pad_ids)
+        )
+        return ObjectClearance(tuple(self._link(i) for i in links), distances, pads)
 
     def _to_object(
         self, shape: int, slices: Sequence[coal.CollisionGeometry], X_BO: pin.SE3
@@ -165,25 +172,72 @@ def revolved_slices(z: ArrayLike, r: ArrayLike) -> tuple[coal.ConvexBase, ...]:
     return tuple(_hull(np.vstack(pair)) for pair in pairwise(rings))
 
 
-def _convex_shapes(hand: Hand) -> tuple[pin.GeometryModel, tuple[int, ...]]:
-    """Hulls and pad spheres as a geometry model, and the ids of the pad spheres."""
-    shapes = pin.GeometryModel()
-    pads = [(*pad_in_joint(hand, finger)[:2], finger) for finger in hand.fingers]
-    for index, visual in enumerate(hand.visual_model.geometryObjects):
-        points = link_points(hand, index)
-        for joint, centre, finger in pads:
-            if joint == visual.parentJoint:
-                outside = np.linalg.norm(points - centre, axis=1) > 1.01 * finger.pad_radius
-                points = points[outside]
-        if _is_solid(points):
-            _add(shapes, visual.name, visual.parentJoint, visual.parentFrame, _hull(points))
-    ids = []
-    for joint, centre, finger in pads:
-        sphere = coal.Sphere(finger.pad_radius)
+class _Shapes:
+    """Hulls and pad spheres as one geometry model, and which of them meet what.
+
+    Attributes:
+        model: All shapes.
+        outer: Ids of those that meet objects.
+        inner: Ids of those that meet other links; of a pad whose link shows no mesh, its sphere.
+        pads: Ids of the pads' spheres.
+    """
+
+    def __init__(self, hand: Hand) -> None:
+        self.model = pin.GeometryModel()
+        self.outer: list[int] = []
+        self.inner: list[int] = []
+        self.pads: list[int] = []
+        whole = {self._add_link(hand, index) for index in range(hand.visual_model.ngeoms)}
+        for finger in hand.fingers:
+            self._add_pad(hand, finger, shown=pad_in_joint(hand, finger)[0] in whole)
+
+    def _add_link(self, hand: Hand, index: int) -> int:
+        """Adds one mesh; returns its joint if it shows a pad, else -1."""
+        visual = hand.visual_model.geometryObjects[index]
+        joint, points = int(visual.parentJoint), link_points(hand, index)
+        inside = _inside_pads(hand, joint, points)
+        outer = self._add_hull(visual, points[~inside])
+        inner = self._add_hull(visual, points) if np.any(inside) else outer
+        self.outer.extend(outer)
+        self.inner.extend(inner)
+        return joint if np.any(inside) and inner else -1
+
+    def _add_hull(self, visual: pin.GeometryObject, points: Array) -> list[int]:
+        if not _is_solid(points):
+            return []
+        name = f"{visual.name} {self.model.ngeoms}"
+        return [_add(self.model, name, visual.parentJoint, visual.parentFrame, _hull(points))]
+
+    def _add_pad(self, hand: Hand, finger: Finger, *, shown: bool) -> None:
+        joint, centre, _ = pad_in_joint(hand, finger)
         at = pin.SE3(np.eye(3), centre)
-        name = f"pad of {finger.name}"
-        ids.append(_add(shapes, name, joint, finger.tip_frame_id, sphere, at))
-    return shapes, tuple(ids)
+        sphere = coal.Sphere(finger.pad_radius)
+        pad = _add(self.model, f"pad of {finger.name}", joint, finger.tip_frame_id, sphere, at)
+        self.outer.append(pad)
+        self.pads.append(pad)
+        if not shown:
+            self.inner.append(pad)
+
+
+def _start_afresh(data: pin.GeometryData) -> None:
+    """Every query from scratch: Pinocchio's default starts from the last answer, and so misses
+    deep overlaps of round hulls, one posture in two thousand on the Allegro hand."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # the old switch overrules the new one
+        for requests in (data.collisionRequests, data.distanceRequests):
+            for request in requests:
+                request.enable_cached_gjk_guess = False
+                request.gjk_initial_guess = coal.GJKInitialGuess.DefaultGuess
+
+
+def _inside_pads(hand: Hand, joint: int, points: Array) -> NDArray[np.bool_]:
+    """(N,) which of a joint's points lie in a pad's sphere."""
+    inside = np.zeros(len(points), dtype=np.bool_)
+    for finger in hand.fingers:
+        at, centre, _ = pad_in_joint(hand, finger)
+        if at == joint:
+            inside |= np.linalg.norm(points - centre, axis=1) <= 1.01 * finger.pad_radius
+    return inside
 
 
 def _add(
@@ -199,8 +253,11 @@ def _add(
     return int(shapes.addGeometryObject(shape))
 
 
-def _pairs(model: pin.Model, shapes: pin.GeometryModel) -> list[tuple[int, int]]:
-    joints = [int(shape.parentJoint) for shape in shapes.geometryObjects]
+def _pairs(
+    model: pin.Model, shapes: pin.GeometryModel, ids: Sequence[int]
+) -> list[tuple[int, int]]:
+    """Pairs of shapes that are not neighbours in the chain of joints."""
+    joints = {i: int(shapes.geometryObjects[i].parentJoint) for i in ids}
 
     def near(i: int, j: int) -> bool:
         """Whether j is i, its parent or its grandparent; the base has no parent but itself."""
@@ -210,8 +267,7 @@ def _pairs(model: pin.Model, shapes: pin.GeometryModel) -> list[tuple[int, int]]
 
     return [
         (i, j)
-        for i in range(len(joints))
-        for j in range(i + 1, len(joints))
+        for i, j in combinations(ids, 2)
         if not near(joints[i], joints[j]) and not near(joints[j], joints[i])
     ]
 

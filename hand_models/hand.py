@@ -16,8 +16,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from hand_models.description import FingerDescription, HandError, known_hands, read_description
-from hand_models.urdf import read_urdf
+from hand_models.assembly import assembled
+from hand_models.description import FingerDescription, known_hands, read_description
+from hand_models.fields import HandError
+from hand_models.joints import joint_motions
+from hand_models.part import Part, link_id
 
 __all__ = ["Finger", "Hand", "HandError", "HandPose", "known_hands", "load_hand"]
 
@@ -31,7 +34,7 @@ class Finger:
 
     Attributes:
         name: E.g. "index".
-        joints: Names of the joints that move the tip, from base to tip.
+        joints: Names of the independent joints that move the tip, from base to tip.
         q_indices: (J,) their indices into q, in the same order.
         tip_frame: Name of the link that carries the pad; its frame is T.
         tip_frame_id: Its index into `model.frames`.
@@ -54,6 +57,9 @@ class Finger:
 class Hand:
     """A hand: kinematics, meshes, fingers. Made by `load_hand`.
 
+    A configuration q holds the independent joints only; joints that follow others (a <mimic> tag)
+    are Pinocchio's mimic joints, and `all_joints` tells where they stand.
+
     Attributes:
         name: Name in its description.
         model: Pinocchio model with fixed base; its universe is the hand base frame B.
@@ -72,8 +78,21 @@ class Hand:
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Joint names in the order of q. This is Pinocchio's order, not that of the fingers."""
-        return tuple(self.model.names)[1:]
+        """Names of the independent joints in the order of q.
+
+        This is Pinocchio's order, not that of the fingers.
+        """
+        joints = list(zip(self.model.names, self.model.joints, strict=True))[1:]
+        return tuple(str(name) for name, joint in joints if joint.nq)
+
+    def all_joints(self, q: ArrayLike) -> dict[str, float]:
+        """Positions of all joints by name, of those that follow others too [rad], [m]."""
+        values = np.asarray(q, dtype=np.float64)
+        motions = joint_motions(self.model)
+        return {
+            str(name): float(motion.at(values))
+            for name, motion in zip(list(self.model.names)[1:], motions, strict=True)
+        }
 
     @cached_property
     def middle(self) -> Array:
@@ -191,38 +210,45 @@ def load_hand(name_or_path: str | Path) -> Hand:
             `hands/allegro_right.toml` explains its fields.
 
     Raises:
-        HandError: Unknown hand; a description that is wrong or does not fit its URDF; a URDF with
-            joints that are not independent, limited, revolute or prismatic.
+        HandError: Unknown hand; a description that is wrong or does not fit its model; a model
+            with joints that are not limited, revolute or prismatic.
     """
     description = read_description(name_or_path)
-    model, visual_model = read_urdf(description)
-    return Hand(
-        name=description.name,
-        model=model,
-        visual_model=visual_model,
-        fingers=tuple(_finger(model, finger, description.name) for finger in description.fingers),
-        lower=_frozen(model.lowerPositionLimit),
-        upper=_frozen(model.upperPositionLimit),
+    try:
+        part = assembled(description)
+        return _hand(description.name, part, description.fingers)
+    except HandError as error:
+        raise HandError(f"{description.name}: {error}") from error
+
+
+def _hand(name: str, part: Part, fingers: tuple[FingerDescription, ...]) -> Hand:
+    hand = Hand(
+        name=name,
+        model=part.model,
+        visual_model=part.shapes,
+        fingers=tuple(_finger(part.model, finger) for finger in fingers),
+        lower=_frozen(part.model.lowerPositionLimit),
+        upper=_frozen(part.model.upperPositionLimit),
     )
+    return hand
 
 
-def _finger(model: pin.Model, description: FingerDescription, hand_name: str) -> Finger:
-    links = {f.name: i for i, f in enumerate(model.frames) if f.type == pin.FrameType.BODY}
+def _finger(model: pin.Model, description: FingerDescription) -> Finger:
+    where = f"finger '{description.name}'"
+    links = [f.name for f in model.frames if f.type == pin.FrameType.BODY]
     if description.tip_frame not in links:
         raise HandError(
-            f"{hand_name}: finger '{description.name}': the URDF has no link"
-            f" '{description.tip_frame}' for tip_frame; its links are {', '.join(links)}"
+            f"{where}: there is no link '{description.tip_frame}' for tip_frame; links are"
+            f" {', '.join(links)}"
         )
-    tip_frame_id = links[description.tip_frame]
-    supports = [int(j) for j in model.supports[model.frames[tip_frame_id].parentJoint] if j > 0]
+    tip_frame_id = link_id(model, description.tip_frame)
+    chain = [int(j) for j in model.supports[model.frames[tip_frame_id].parentJoint] if j > 0]
+    supports = [j for j in chain if model.joints[j].nq]  # followers bring no freedom of their own
     if not supports:
-        raise HandError(
-            f"{hand_name}: finger '{description.name}': no joint moves tip_frame"
-            f" '{description.tip_frame}'"
-        )
+        raise HandError(f"{where}: no joint moves tip_frame '{description.tip_frame}'")
     return Finger(
         name=description.name,
-        joints=tuple(model.names[j] for j in supports),
+        joints=tuple(str(model.names[j]) for j in supports),
         q_indices=_frozen_indices([model.joints[j].idx_q for j in supports]),
         tip_frame=description.tip_frame,
         tip_frame_id=tip_frame_id,
