@@ -21,6 +21,7 @@ from hand_models.description import FingerDescription, known_hands, read_descrip
 from hand_models.fields import HandError
 from hand_models.joints import joint_motions
 from hand_models.part import Part, link_id
+from hand_models.sense import check_sense
 
 __all__ = ["Finger", "Hand", "HandError", "HandPose", "known_hands", "load_hand"]
 
@@ -211,18 +212,19 @@ def load_hand(name_or_path: str | Path) -> Hand:
 
     Raises:
         HandError: Unknown hand; a description that is wrong or does not fit its model; a model
-            with joints that are not limited, revolute or prismatic.
+            with joints that are not limited, revolute or prismatic, or of a size no hand has.
     """
     description = read_description(name_or_path)
     try:
-        part = assembled(description)
-        return _hand(description.name, part, description.fingers)
+        hand = _hand(description.name, assembled(description), description.fingers)
+        check_sense(hand)
     except HandError as error:
         raise HandError(f"{description.name}: {error}") from error
+    return hand
 
 
 def _hand(name: str, part: Part, fingers: tuple[FingerDescription, ...]) -> Hand:
-    hand = Hand(
+    return Hand(
         name=name,
         model=part.model,
         visual_model=part.shapes,
@@ -230,7 +232,6 @@ def _hand(name: str, part: Part, fingers: tuple[FingerDescription, ...]) -> Hand
         lower=_frozen(part.model.lowerPositionLimit),
         upper=_frozen(part.model.upperPositionLimit),
     )
-    return hand
 
 
 def _finger(model: pin.Model, description: FingerDescription) -> Finger:

@@ -162,11 +162,57 @@ WRONG_FIELDS = [
         "two fingers are named 'only'",
     ),
     ("[[fingers]]", "[[fingers", "not a TOML file"),
+    (
+        'source = "planar.urdf"',
+        'source = "planar.urdf"\nbase = "palm"',
+        "no link 'palm' for base; links are base, proximal",
+    ),
+    (
+        'source = "planar.urdf"',
+        'source = "planar.urdf"\nfixed = {wrist = 0.0}',
+        "no joint 'wrist' to be fixed; joints are knuckle, elbow",
+    ),
+    (
+        'source = "planar.urdf"',
+        'source = "planar.urdf"\nfixed = {elbow = "bent"}',
+        "fixed must be a table of finite numbers, got",
+    ),
+    (
+        "[[fingers]]",
+        "[[copies]]\nposition = [0, 0, 0]\n[[fingers]]",
+        r"copies\[0\]: key 'prefix' is missing",
+    ),
+    (
+        "[[fingers]]",
+        '[[copies]]\nprefix = "a"\n[[copies]]\nprefix = "a"\n[[fingers]]',
+        "two links are named 'abase'; a prefix tells copies apart",
+    ),
+]
+
+WRONG_SIZES = [
+    ("0.008", "8", "pad_radius is 8 m, as if millimetres were taken for metres"),
+    ("[0.0, 0.005, 0.0]", "[0.0, 5.0, 0.0]", "finger 'only' is 4.95 m long .*as if millimetres"),
+    (
+        "[0.0, 0.005, 0.0]",
+        f"[{-LOWER}, 0.0, 0.0]",
+        "joint elbow does not move the pad .*: a link of no length, or a wrong tip_frame",
+    ),
 ]
 
 
 @pytest.mark.parametrize(("right", "wrong", "message"), WRONG_FIELDS)
 def test_a_wrong_field_is_named_in_one_line(
+    tmp_path: Path, right: str, wrong: str, message: str
+) -> None:
+    assert right in DESCRIPTION
+    file = _write(tmp_path, DESCRIPTION.replace(right, wrong, 1))
+    with pytest.raises(HandError, match=message) as refused:
+        load_hand(file)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(("right", "wrong", "message"), WRONG_SIZES)
+def test_a_size_that_no_hand_has_is_told_with_what_to_look_at(
     tmp_path: Path, right: str, wrong: str, message: str
 ) -> None:
     assert right in DESCRIPTION
@@ -199,6 +245,16 @@ WRONG_URDFS = [
     ("</robot>", "", "cannot read '.*planar.urdf'"),
     ('<child link="nail"/>', '<child link="thumb"/>', "'fixed' has the child link 'thumb', which"),
     ("wedge.stl", "missing.stl", "cannot read '.*planar.urdf': .*missing.stl"),
+    (
+        'filename="meshes/wedge.stl"',
+        'filename="meshes/wedge.stl" scale="1000 1000 1000"',
+        "mesh of 'proximal_0' is 10 m long, as if millimetres were taken for metres: <mesh scale",
+    ),
+    (
+        f'xyz="{UPPER} 0 0"',
+        f'xyz="{1000 * UPPER} 0 0"',
+        "finger 'only' is 60 m long from its first joint to its pad, as if millimetres",
+    ),
 ]
 
 
