@@ -87,8 +87,10 @@ class HandCollision:
         return tuple(self._named(k, float(distances[k])) for k in order)
 
     def self_clearance(self, q: ArrayLike) -> LinkPair:
-        """The two links nearest to each other."""
+        """The two links nearest to each other; none, infinitely far, where no two could meet."""
         distances = self._self_distances(q)
+        if len(distances) == 0:
+            return LinkPair("", "", np.inf)
         nearest = int(np.argmin(distances))
         return self._named(nearest, float(distances[nearest]))
 

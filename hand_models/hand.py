@@ -20,7 +20,7 @@ from hand_models.assembly import assembled
 from hand_models.description import FingerDescription, known_hands, read_description
 from hand_models.fields import HandError
 from hand_models.joints import joint_motions
-from hand_models.part import Part, link_id
+from hand_models.part import Coupling, Part, link_id
 from hand_models.sense import check_sense
 
 __all__ = ["Finger", "Hand", "HandError", "HandPose", "known_hands", "load_hand"]
@@ -35,7 +35,8 @@ class Finger:
 
     Attributes:
         name: E.g. "index".
-        joints: Names of the independent joints that move the tip, from base to tip.
+        joints: Names of the independent joints that move the tip, from base to tip; of a joint
+            that follows another, the one that drives it.
         q_indices: (J,) their indices into q, in the same order.
         tip_frame: Name of the link that carries the pad; its frame is T.
         tip_frame_id: Its index into `model.frames`.
@@ -83,8 +84,18 @@ class Hand:
 
         This is Pinocchio's order, not that of the fingers.
         """
-        joints = list(zip(self.model.names, self.model.joints, strict=True))[1:]
-        return tuple(str(name) for name, joint in joints if joint.nq)
+        return tuple(str(name) for name, _ in _own_joints(self.model))
+
+    @property
+    def couplings(self) -> tuple[Coupling, ...]:
+        """Joints that follow others."""
+        names = self.joint_names
+        motions = zip(list(self.model.names)[1:], joint_motions(self.model), strict=True)
+        return tuple(
+            Coupling(str(name), names[motion.q_index], motion.multiplier, motion.offset)
+            for name, motion in motions
+            if str(name) not in names
+        )
 
     def all_joints(self, q: ArrayLike) -> dict[str, float]:
         """Positions of all joints by name, of those that follow others too [rad], [m]."""
@@ -199,7 +210,7 @@ class HandPose:
         X_JP = frame.placement * pin.SE3(np.eye(3), finger.pad_centre)  # pad in its joint's frame
         J_B = pin.getFrameJacobian(
             self.hand.model, self.data, frame.parentJoint, X_JP, pin.LOCAL_WORLD_ALIGNED
-        )
+        ).reshape(6, -1)  # of a hand with one joint it is a vector
         return _frozen(np.kron(np.eye(2), self.X_WB.rotation) @ J_B)
 
 
@@ -244,19 +255,26 @@ def _finger(model: pin.Model, description: FingerDescription) -> Finger:
         )
     tip_frame_id = link_id(model, description.tip_frame)
     chain = [int(j) for j in model.supports[model.frames[tip_frame_id].parentJoint] if j > 0]
-    supports = [j for j in chain if model.joints[j].nq]  # followers bring no freedom of their own
-    if not supports:
+    if not chain:
         raise HandError(f"{where}: no joint moves tip_frame '{description.tip_frame}'")
+    drivers = {int(model.joints[j].idx_q): None for j in chain}  # in order, each once
+    names = {int(joint.idx_q): str(name) for name, joint in _own_joints(model)}
     return Finger(
         name=description.name,
-        joints=tuple(str(model.names[j]) for j in supports),
-        q_indices=_frozen_indices([model.joints[j].idx_q for j in supports]),
+        joints=tuple(names[i] for i in drivers),
+        q_indices=_frozen_indices(list(drivers)),
         tip_frame=description.tip_frame,
         tip_frame_id=tip_frame_id,
         pad_centre=_frozen(description.pad_centre),
         pad_normal=_frozen(description.pad_normal),
         pad_radius=description.pad_radius,
     )
+
+
+def _own_joints(model: pin.Model) -> list[tuple[str, pin.JointModel]]:
+    """Names and models of the joints that follow no other, in the order of q."""
+    joints = list(zip(model.names, model.joints, strict=True))[1:]
+    return [(str(name), joint) for name, joint in joints if joint.nq]
 
 
 def _frozen(values: ArrayLike) -> Array:

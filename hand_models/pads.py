@@ -95,20 +95,31 @@ def tip_points(part: Part, frame: int) -> Array:
     return np.vstack(parts)
 
 
-def measure_pad(part: Part, frame: int) -> PadFit:
+def measure_pad(part: Part, frame: int, *, towards: Array | None = None) -> PadFit:
     """The pad of a fingertip: its normal guessed from how the finger bends, its sphere fitted.
 
-    The last joint that moves the link closes the finger towards the farther of its limits; the
-    pad looks that way, tilted towards the finger's end: by 30 degrees, as a pad that faces the
-    palm touches little, and by more where the tip is round at its end only.
+    The last joint that moves the link closes the finger towards the farther of its limits, or,
+    where it bends both ways alike or slides, towards the other fingertips. The pad looks that way,
+    tilted towards the finger's end: by 30 degrees, as a pad that faces the palm touches little,
+    and by more where the tip is round at its end only. A gripper's jaw looks straight ahead.
+
+    Args:
+        frame: Of the link that is the fingertip.
+        towards: (3,) middle of the other fingertips, in the link's frame; None if there are none.
     """
     points = tip_points(part, frame)
     origin, axis, linear = _last_joint(part, frame)
     away = points - origin
     distal = _unit(_across(away[np.argmax(np.linalg.norm(away, axis=1))], axis))
     closing = _unit(np.cross(axis, distal) + linear)
-    across = _unit(_across(_sense(part.model, frame) * closing, distal))
-    fits = [fit_pad(points, np.cos(t) * across + np.sin(t) * distal) for t in TILTS]
+    sense = _sense(part.model, frame)
+    if sense == 0.0:
+        middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        sense = 1.0 if towards is None or (towards - middle) @ closing >= 0.0 else -1.0
+    distal = _across(distal, closing) if np.any(linear) else distal
+    across = _unit(_across(sense * closing, distal))
+    tilts = (0.0,) if np.any(linear) else TILTS
+    fits = [fit_pad(points, np.cos(t) * across + np.sin(t) * distal) for t in tilts]
     good = [fit for fit in fits if fit.misfit < GOOD]
     return good[0] if good else min(fits, key=lambda fit: fit.misfit)
 
@@ -128,10 +139,14 @@ def _last_joint(part: Part, frame: int) -> tuple[Array, Array, Array]:
 
 
 def _sense(model: pin.Model, frame: int) -> float:
-    """+1 or -1: which way a link's joint bends; of one that bends both ways alike, +1."""
-    at = model.joints[model.frames[frame].parentJoint].idx_q
-    lower, upper = float(model.lowerPositionLimit[at]), float(model.upperPositionLimit[at])
-    return -1.0 if upper + lower < -_LOPSIDED * (upper - lower) else 1.0
+    """+1 or -1: which way a link's joint bends; 0 if both ways alike, or if it slides."""
+    joint = model.joints[model.frames[frame].parentJoint]
+    lower, upper = (
+        float(q[joint.idx_q]) for q in (model.lowerPositionLimit, model.upperPositionLimit)
+    )
+    if np.any(joint_motion(joint).linear) or abs(upper + lower) <= _LOPSIDED * (upper - lower):
+        return 0.0
+    return float(np.sign(upper + lower))
 
 
 def _across(v: Array, axis: Array) -> Array:

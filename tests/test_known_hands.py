@@ -83,6 +83,9 @@ def test_a_coupled_finger_moves_as_its_mimic_tag_says():
     """Truth: the same URDF with all joints free, the followers set by hand."""
     hand = hand_named("psyonic_right")
     free = pin.buildModelFromUrdf(str(read_description("psyonic_right").source.file))
+    assert {c.joint: (c.follows, round(c.multiplier, 8)) for c in hand.couplings} == {
+        f"Right_{f}_q2": (f"Right_{f}_q1", 1.05851325) for f in ("index", "middle", "ring", "pinky")
+    }
     tags = {
         joint.get("name"): joint.find("mimic")
         for joint in ElementTree.parse(read_description("psyonic_right").source.file).iter("joint")
