@@ -1,6 +1,8 @@
 """Plans and steps as JSON: SI, radians, joint names, poses as position and quaternion (x, y, z, w).
 
-plan.json holds {"hand", "joint_names", "rounds": [plan, ...], "grasp": grasp or null}; the fields
+plan.json holds {"hand", "joint_names", "coupled_joints", "rounds": [plan, ...], "grasp": grasp or
+null}; joint positions are those of `joint_names`, and a coupled joint {"joint", "follows",
+"multiplier", "offset"} stands at multiplier times the position of `follows` plus offset; the fields
 of a plan and of its probes are those of `plan_record` and `probe_record` below, those of a grasp
 of `grasp_record`.
 """
@@ -27,6 +29,7 @@ def plan_document(hand: Hand, plans: list[Plan], grasp: Grasp | None = None) -> 
     return {
         "hand": hand.name,
         "joint_names": list(hand.joint_names),
+        "coupled_joints": [vars(coupling) for coupling in hand.couplings],
         "units": {"length": "m", "angle": "rad"},
         "rounds": [plan_record(plan) for plan in plans],
         "grasp": None if grasp is None else grasp_record(hand, grasp),
@@ -105,7 +108,7 @@ def reach_record(reach: Reach) -> dict[str, Any]:
         "position_residual": reach.position_residual,
         "pad_angle": reach.pad_angle,
         "joint_limit_margin": reach.limit_margin,
-        "self_clearance": reach.self_clearance,
+        "self_clearance": _finite(reach.self_clearance),
         "object_clearance": reach.object_clearance,
         "solver": reach.solver,
     }

@@ -19,7 +19,6 @@ Examples:
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -28,9 +27,11 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import tyro
+from describe_hand import Options as DescribeOptions
+from describe_hand import describe
 from grasp_ending import Ending, ending, ending_record, grip_of, print_ending
 from grasp_report import episode_of, print_round, raw_touches
-from output_files import require_writable, write_whole
+from output_files import require_writable, write_json
 from rich.console import Console
 
 from estimator.axis import Axis, angle_between, offset_at
@@ -64,7 +65,9 @@ class Options:
     """Command line of plan_grasp.py."""
 
     hand: str = "allegro_right"
-    """Hand: allegro_right, allegro_left, or the path of a description (.toml)."""
+    """Hand: one of hand_models/hands, or the path of a description (.toml)."""
+    describe_hand: Path | None = None
+    """Instead of all this, propose a description of the hand in this URDF or MJCF, into --out."""
     object: str = "can"
     """What is touched: a built-in name (can, bottle, cone, cup, barrel, jar-lid, knob, vase, egg,
     spindle, paper-lathe, sphere) or a CSV file with columns r_mm,z_mm."""
@@ -113,6 +116,8 @@ class Scenario:
 
 def main() -> int:
     options = tyro.cli(Options, description=__doc__)
+    if options.describe_hand is not None:
+        return describe(DescribeOptions(options.describe_hand, out=options.out))
     console = Console()
     try:
         scenario = _scenario(options)
@@ -230,7 +235,7 @@ def _conclude(
     unconfirmed = steps[-1].surprise if steps else None
     met = scenario.goal.met_by(belief) and unconfirmed is None
     truth = scenario.surface.axis
-    middle = _middle(scenario.surface)
+    middle = truth.point + np.mean(scenario.surface.profile.z_range) * truth.direction
     error = {
         "angle_deg": float(np.rad2deg(angle_between(belief.axis, truth))),
         "offset_mm": 1e3 * offset_at(belief.axis, truth, middle),
@@ -263,9 +268,7 @@ def _conclude(
         "rounds": [step_record(step) for step in steps],
         "grasp": ending_record(end),
     }
-    document = plan_document(scenario.hand, [step.plan for step in steps], end.grasp)
-    plans = json.dumps(document, indent=1, allow_nan=False)
-    told = json.dumps(result, indent=1, allow_nan=False)
+    plans = plan_document(scenario.hand, [step.plan for step in steps], end.grasp)
     try:
         options.out.mkdir(parents=True, exist_ok=True)
         if steps:
@@ -275,8 +278,8 @@ def _conclude(
                 grip_of(scenario.hand, end),
             )  # fmt: skip
             write_page(options.out / "probes.html", scenario.hand, episode)
-        write_whole(options.out / "plan.json", f"{plans}\n".encode())
-        write_whole(options.out / "result.json", f"{told}\n".encode())
+        write_json(options.out / "plan.json", plans)
+        write_json(options.out / "result.json", result)
         raw = raw_touches(options.sensor, steps, scenario.world)
         if raw is not None:
             write_raw(options.out / "raw.npz", raw)
@@ -290,10 +293,6 @@ def _conclude(
         return 0
     console.print(f"[bold red]Goal not met[/]: {reason}")
     return 1
-
-
-def _middle(surface: SurfaceOfRevolution) -> np.ndarray:
-    return surface.axis.point + np.mean(surface.profile.z_range) * surface.axis.direction
 
 
 if __name__ == "__main__":
