@@ -12,6 +12,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import combinations, pairwise
 
 import coal
@@ -66,10 +67,8 @@ class HandCollision:
 
     def __init__(self, hand: Hand) -> None:
         self.hand = hand
-        shapes = _Shapes(hand)
+        shapes = _shapes_of(hand)
         self._shapes, self._outer, self._pad_ids = shapes.model, shapes.outer, shapes.pads
-        for i, j in _pairs(hand.model, shapes.model, shapes.inner):
-            self._shapes.addCollisionPair(pin.CollisionPair(i, j))
         self._data = hand.model.createData()
         self._shape_data = pin.GeometryData(self._shapes)
         _start_afresh(self._shape_data)
@@ -192,6 +191,8 @@ class _Shapes:
         whole = {self._add_link(hand, index) for index in range(hand.visual_model.ngeoms)}
         for finger in hand.fingers:
             self._add_pad(hand, finger, shown=pad_in_joint(hand, finger)[0] in whole)
+        for i, j in _pairs(hand.model, self.model, self.inner):
+            self.model.addCollisionPair(pin.CollisionPair(i, j))
 
     def _add_link(self, hand: Hand, index: int) -> int:
         """Adds one mesh; returns its joint if it shows a pad, else -1."""
@@ -219,6 +220,12 @@ class _Shapes:
         self.pads.append(pad)
         if not shown:
             self.inner.append(pad)
+
+
+@lru_cache(maxsize=8)
+def _shapes_of(hand: Hand) -> _Shapes:
+    """What takes tens of milliseconds and is only read afterwards."""
+    return _Shapes(hand)
 
 
 def _start_afresh(data: pin.GeometryData) -> None:
