@@ -70,7 +70,9 @@ def plan_probes(
         NoPlan: Not even a single touch is left; its funnel says why.
     """
     options = options or PlannerOptions()
-    most = min(options.fingers_at_once, len(hand.fingers))
+    # A finger of one joint cannot go along a normal: the arm does, for one finger at a time.
+    nimble = sum(len(finger.joints) > 1 for finger in hand.fingers)
+    most = max(1, min(options.fingers_at_once, nimble))
     counts = range(most, 0, -1)
     return plan_preferred(hand, belief, sensor, counts, goal=goal, rng=rng, options=options)
 
