@@ -7,7 +7,7 @@ works on other shapes (`hand_models.spheres`), so this check is independent of i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -52,6 +52,23 @@ class ObjectClearance:
         """Name and distance of the link nearest to the object, pads left out [m]."""
         i = int(np.argmin(self.distances))
         return self.links[i], float(self.distances[i])
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """Something a hand may meet, as convex parts.
+
+    Args:
+        name: As it is called in a sentence, e.g. "the object".
+        parts: In the body's frame.
+        X_WO: Pose of that frame in the world.
+        around: A convex shape that holds all parts, to pass over what is far; None for one part.
+    """
+
+    name: str
+    parts: tuple[coal.CollisionGeometry, ...]
+    X_WO: pin.SE3
+    around: coal.CollisionGeometry | None = None
 
 
 class HandCollision:
@@ -111,6 +128,36 @@ class HandCollision:
         names = tuple(self._link(i) for i in links)
         return ObjectClearance(names, distances[links], distances[list(self._pad_ids)])
 
+    def nearest_to(
+        self, q: ArrayLike, X_WB: pin.SE3, body: Body, *, touching: Collection[str] = ()
+    ) -> LinkPair:
+        """The link, or pad, nearest to a body.
+
+        Args:
+            q: (nq,) joint positions.
+            X_WB: Pose of the hand base.
+            body: The body.
+            touching: Fingers whose pads do not count.
+        """
+        pin.updateGeometryPlacements(
+            self.hand.model, self._data, self._shapes, self._shape_data, np.asarray(q)
+        )
+        X_BO = X_WB.inverse() * body.X_WO
+        exempt = {i for i, f in zip(self._pad_ids, self.hand.fingers, strict=True)
+                  if f.name in touching}  # fmt: skip
+        shapes = [i for i in range(self._shapes.ngeoms) if i not in exempt]
+        around = body.parts[:1] if body.around is None else (body.around,)
+        bounds = [(self._to_object(i, around, X_BO), i) for i in shapes]
+        if body.around is None:
+            least, nearest = min(bounds)
+            return LinkPair(self._part(nearest), body.name, least)
+        least, nearest = np.inf, -1
+        for bound, i in sorted(bounds):
+            if bound > least:
+                break
+            least, nearest = min((least, nearest), (self._to_object(i, body.parts, X_BO), i))
+        return LinkPair(self._part(nearest), body.name, least)
+
     def _to_object(
         self, shape: int, slices: Sequence[coal.CollisionGeometry], X_BO: pin.SE3
     ) -> float:
@@ -134,6 +181,12 @@ class HandCollision:
     def _named(self, pair: int, distance: float) -> LinkPair:
         ids = self._shapes.collisionPairs[pair]
         return LinkPair(self._link(int(ids.first)), self._link(int(ids.second)), distance)
+
+    def _part(self, shape: int) -> str:
+        """A pad by its finger, another shape by its link."""
+        if shape in self._pad_ids:
+            return f"the pad of {self.hand.fingers[self._pad_ids.index(shape)].name}"
+        return self._link(shape)
 
     def _link(self, shape: int) -> str:
         frame = self._shapes.geometryObjects[shape].parentFrame

@@ -29,11 +29,14 @@ from planner.options import PlannerOptions
 from planner.plan_types import NoPlan, Plan, Probe
 from planner.reach import Reach, ReachSolver, Unreachable
 from planner.reach_task import ReachOptions
-from planner.retreat import Retreat, plan_retreat
+from planner.retreat import Retreat, ways_out
 from planner.risk import risks
+from planner.round_motion import RoundMotion, plan_round
 from planner.solid import RevolvedSolid
 from planner.starts import Start
+from planner.surroundings import surroundings
 from planner.sweep import FROM, swept, with_swept
+from planner.transfer import Movable
 from planner.worth import Worth, guarded
 
 __all__ = ["NoPlan", "Plan", "Probe", "plan_preferred", "plan_probes"]
@@ -61,6 +64,7 @@ class _Made(NamedTuple):
     reach: Reach
     approaches: tuple[Approach, ...]
     retreat: Retreat
+    motion: RoundMotion | None
 
 
 @lru_cache(maxsize=8)
@@ -245,11 +249,18 @@ def _made(
         return reach.reason
     ways = plan_approaches(tools.hand, reach) if several else (approach_by_base(tools.hand, reach),)
     X_WB = reach.X_WB if several else ways[0].bases[0]
-    retreat = plan_retreat(
-        tools.hand, tools.spheres, belief, reach.q_standoff, X_WB, np.asarray(place.n)
-    )
     gentle = tuple(replace(way, force_goal=options.force_goal) for way in ways)
-    return _Made(reach, gentle, retreat)
+    out = ways_out(tools.hand, tools.spheres, belief, reach.q_standoff, X_WB, np.asarray(place.n))
+    if options.start is None:
+        return _Made(reach, gentle, out[0], None)
+    motion = plan_round(_movable(tools, options, solid), gentle, out, options.start)
+    return motion if isinstance(motion, str) else _Made(reach, gentle, motion.retreat, motion)
+
+
+def _movable(tools: _Tools, options: PlannerOptions, solid: RevolvedSolid) -> Movable:
+    rules = options.reach
+    around = surroundings(tools.collision, solid, rules.table, rules.boxes)
+    return Movable(tools.hand, around, options.limits, rules.workspace)
 
 
 def _plan(
@@ -281,6 +292,7 @@ def _plan(
         label_probability=float(ranking.label_probability[i]),
         funnel=funnel,
         retreat=made.retreat,
+        motion=made.motion,
     )
 
 
