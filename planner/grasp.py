@@ -29,12 +29,10 @@ from planner.hand_tools import HandTools, hand_tools
 from planner.motion import Approach, plan_approaches
 from planner.reach import Reach, Unreachable
 from planner.reach_task import ReachOptions
-from planner.solid import RevolvedSolid
+from planner.solid import RevolvedSolid, believed_solid
 from planner.starts import Start
 
 __all__ = ["Friction", "Grasp", "GraspOptions", "Hold", "NoGrasp", "closes_on", "plan_grasp"]
-
-_HEIGHTS = 101  # of the believed object as an obstacle
 
 
 def plan_grasp(
@@ -59,7 +57,7 @@ def plan_grasp(
     tools = hand_tools(hand, options.reach)
     bodies = bodies_of(sample_objects(belief, options.objects, rng=rng))
     ranked, funnel = _ranked(tools, belief.surface, bodies, options, rng)
-    solid = _solid(belief.surface)
+    solid = believed_solid(belief.surface)
     failures: dict[str, int] = {}
     for one in ranked[: options.tries]:
         made = _made(tools, solid, one, options)
@@ -184,13 +182,6 @@ def _closings(
 
 def _start(hand: Hand, laid: Candidates, i: int) -> Start:
     return Start(tuple(hand.fingers[k].name for k in laid.fingers[i]), laid.q[i], laid.base(i))
-
-
-def _solid(surface: SurfaceOfRevolution) -> RevolvedSolid:
-    """The believed object as an obstacle."""
-    z = np.linspace(*surface.profile.z_range, _HEIGHTS)
-    X_WO = pin.SE3(np.ascontiguousarray(surface.frame.T), np.array(surface.axis.point))
-    return RevolvedSolid(X_WO, z, surface.profile.derivatives(z)[0])
 
 
 def _made(

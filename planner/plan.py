@@ -8,7 +8,6 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-import pinocchio as pin
 
 from estimator.belief import Belief, sample_objects
 from estimator.bounds import AxisBound
@@ -29,7 +28,7 @@ from planner.reach import Reach, Unreachable
 from planner.retreat import Retreat, ways_out
 from planner.risk import risks
 from planner.round_motion import RoundMotion, plan_round
-from planner.solid import RevolvedSolid
+from planner.solid import RevolvedSolid, believed_solid
 from planner.starts import Start
 from planner.surroundings import surroundings
 from planner.sweep import FROM, swept, with_swept
@@ -40,7 +39,6 @@ __all__ = ["NoPlan", "Plan", "Probe", "plan_preferred", "plan_probes"]
 
 Preference = Callable[[Candidates, Ranking], Index]
 
-SOLID_HEIGHTS = 101
 RISK_OBJECTS = 40
 
 
@@ -142,7 +140,7 @@ def _best_placement(
     if prefer is not None:
         ranking = replace(ranking, order=prefer(candidates, ranking))
     funnel += tuple((f"{count} fingers: singular: {words}", n) for words, n in ranking.rejected)
-    solid = _solid(belief.surface)
+    solid = believed_solid(belief.surface)
     failures: dict[str, int] = {}
     for i in ranking.order[: options.tries].tolist():
         made = _made(tools, belief, options, solid, candidates, i)
@@ -185,13 +183,6 @@ def _candidates(
     make = single_candidates if count == 1 else partial(placement_candidates, fingers_at_once=count)
     workspace, several = options.reach.workspace, options.placements
     return make(tools.reach_map, surface, workspace=workspace, count=several, rng=rng)
-
-
-def _solid(surface: SurfaceOfRevolution) -> RevolvedSolid:
-    """The believed object as the optimiser's obstacle."""
-    z = np.linspace(*surface.profile.z_range, SOLID_HEIGHTS)
-    X_WO = pin.SE3(np.ascontiguousarray(surface.frame.T), np.array(surface.axis.point))
-    return RevolvedSolid(X_WO, z, surface.profile.derivatives(z)[0])
 
 
 def _made(
