@@ -128,10 +128,18 @@ def _along(
     path, rows = np.array(approach.path), np.arange(len(approach.path))
     path[0] = q_begin
     q = np.array([np.interp(places, rows, column) for column in path.T]).T
-    tips = np.array([np.interp(places, rows, column) for column in approach.tip_centres.T]).T
+    tips = np.array([np.interp(places, rows, column) for column in approach.tip_centres.T]).T[
+        :, None
+    ]
     bases = tuple(_base_at(approach, float(place)) for place in places)
     made = timed(
-        movable.hand, phase, q, bases, movable.limits, tips=tips, touching=(approach.finger,)
+        movable.hand,
+        phase,
+        q,
+        bases,
+        movable.limits,
+        tips=tips[:, None],
+        touching=(approach.finger,),
     )
     if made is None:
         return None

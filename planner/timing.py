@@ -78,8 +78,8 @@ def timed(
     Args:
         q: Points of the path, (N, nq).
         bases: Pose of the base at each.
-        tips: Places of a fingertip at each, (N, 3) [m]; it keeps to `touch_speed` on an approach,
-            otherwise to `near_speed`.
+        tips: Places of m fingertips at each, (N, m, 3) [m]; where they are to touch they keep to
+            `touch_speed`, otherwise to `near_speed`.
         touching: Fingers whose pads touch the object on the way.
     Raises:
         ArithmeticError: TOPP-RA finds no speed for the path.
@@ -90,7 +90,11 @@ def timed(
     if kept.sum() < 2:
         return None
     place = length[kept] / length[-1]
-    columns = [path[kept], place[:, None], *([] if tips is None else [tips[kept]])]
+    columns = [
+        path[kept],
+        place[:, None],
+        *([] if tips is None else [tips[kept].reshape(kept.sum(), -1)]),
+    ]
     motion = _motion(np.hstack(columns), hand, limits, phase)
     times = _waypoints(hand, motion, float(motion.duration))
     nq, rows = hand.model.nq, motion(times)
@@ -114,9 +118,8 @@ def _motion(path: Array, hand: Hand, limits: MotionLimits, phase: Phase) -> Any:
     near = min(limits.near_speed, limits.base_speed)
     base = limits.base_speed if phase == "transfer" else near
     norms = [(slice(n, n + 3), base), (slice(n + 3, n + 7), limits.base_turn / 2.0)]
-    if more > 1:
-        tip = limits.touch_speed if phase in ("approach", "close") else near
-        norms.append((slice(n + 8, n + 11), tip))
+    tip = limits.touch_speed if phase in ("approach", "close") else near
+    norms += [(slice(k, k + 3), tip) for k in range(n + 8, path.shape[1], 3)]
     most = np.concatenate([
         np.full(n, limits.joint_acceleration),
         np.full(3, limits.base_acceleration / np.sqrt(3.0)),
