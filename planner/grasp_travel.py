@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import pinocchio as pin
 
 from hand_models.hand import Hand
-from planner.grasp_outcome import Grasp
 from planner.motion import FORCE_GOAL
 from planner.motion_certificate import MotionCertificate, together
-from planner.timing import timed
+from planner.reach import Reach
+from planner.timing import MotionLimits, timed
 from planner.trajectory import Array, Configuration, Guard, Trajectory
 from planner.transfer import Movable, plan_transfer
 
@@ -23,6 +24,7 @@ class GraspMotion:
         transfer: From where it was to the way in; None where it is there.
         enter: The way in, fingers open.
         close: All fingers together; each stops on its own when it touches.
+        limits: What they keep.
         certificate: The worst over all waypoints.
         sampled: Whether the transfer had to go round something.
     """
@@ -30,6 +32,7 @@ class GraspMotion:
     transfer: Trajectory | None
     enter: Trajectory | None
     close: Trajectory
+    limits: MotionLimits
     certificate: MotionCertificate
     sampled: bool = False
 
@@ -41,56 +44,61 @@ class GraspMotion:
 
 
 def plan_grasp_motion(
-    movable: Movable, grasp: Grasp, start: Configuration, *, wanted: float
+    movable: Movable,
+    reach: Reach,
+    way_in: tuple[pin.SE3, ...],
+    closing: Array,
+    contact_index: int,
+    start: Configuration,
+    *,
+    wanted: float,
 ) -> GraspMotion | str:
-    """Certified motions for a planned grasp, or in words why there are none.
+    """Certified motions for a grasp, or in words why there are none.
 
     Args:
+        reach: Of the grasp.
+        way_in: Base poses from afar to the pre-grasp, fingers open.
+        closing: All fingers from the pre-grasp through the grasp, (K, nq).
+        contact_index: The row that is the grasp.
         start: Where the hand is.
         wanted: How far to stay from the believed object on the way to it [m].
     """
-    enter = timed(
-        movable.hand, "enter", np.repeat(grasp.q_pregrasp[None], len(grasp.approach), axis=0),
-        grasp.approach, movable.limits,
-    )  # fmt: skip
-    close = closing_motion(movable, grasp, grasp.path)
-    parts = [one for one in (enter, close) if one is not None]
-    found = [movable.certify(one) for one in parts]
-    for word, one in zip(("on the way in", "while closing")[-len(parts) :], found, strict=True):
-        if one.faults:
-            return f"{word}, {one.faults[0]}"
-    outside = Configuration(grasp.q_pregrasp, grasp.approach[0])
-    transfer = plan_transfer(movable, start, outside, wanted=wanted)
+    hand, limits = movable.hand, movable.limits
+    q = np.repeat(reach.q_standoff[None], len(way_in), axis=0)
+    close = closing_motion(hand, limits, reach, closing, contact_index)
+    enter = timed(hand, "enter", q, way_in, limits)
+    found = []
+    for word, part in (("on the way in", enter), ("while closing", close)):
+        if part is not None:
+            found.append(movable.certify(part))
+            if found[-1].faults:
+                return f"{word}, {found[-1].faults[0]}"
+    transfer = plan_transfer(movable, start, Configuration(q[0], way_in[0]), wanted=wanted)
     if isinstance(transfer, str):
         return f"on the way to the grasp, {transfer}"
     if transfer.certificate is not None:
         found.append(transfer.certificate)
     if enter is not None:
-        every = tuple(finger.name for finger in movable.hand.fingers)
-        enter = replace(enter, guard=Guard(every, FORCE_GOAL))
-    return GraspMotion(transfer.trajectory, enter, close, together(found), transfer.sampled)
+        enter = replace(enter, guard=Guard(tuple(f.name for f in hand.fingers), FORCE_GOAL))
+    worst = together(found)
+    return GraspMotion(transfer.trajectory, enter, close, limits, worst, transfer.sampled)
 
 
-def closing_motion(movable: Movable, grasp: Grasp, path: Array) -> Trajectory:
+def closing_motion(
+    hand: Hand, limits: MotionLimits, reach: Reach, path: Array, contact_index: int
+) -> Trajectory:
     """Fingers along a path of closing, in time.
 
     Args:
         path: Of the grasp itself, or what became of it, (K, nq).
+        contact_index: The row at which contact is expected.
     Raises:
         ValueError: Nothing moves.
     """
-    tips = _tips(movable.hand, grasp, path)
-    bases = (grasp.X_WB,) * len(path)
-    made = timed(
-        movable.hand, "close", path, bases, movable.limits, tips=tips, touching=grasp.fingers
-    )
+    rows = [hand.fingers.index(hand.finger(name)) for name in reach.fingers]
+    tips = np.array([hand.at(q, reach.X_WB).pad_centres[rows] for q in path])
+    bases = (reach.X_WB,) * len(path)
+    made = timed(hand, "close", path, bases, limits, tips=tips, touching=reach.fingers)
     if made is None:
         raise ValueError("the fingers of a grasp do not move")
-    expected = made.time_of(grasp.contact_index)
-    return replace(made, guard=Guard(grasp.fingers, FORCE_GOAL, expected))
-
-
-def _tips(hand: Hand, grasp: Grasp, path: Array) -> Array:
-    """Places of the closing fingers' pads, (K, m, 3) [m]."""
-    rows = [hand.fingers.index(hand.finger(name)) for name in grasp.fingers]
-    return np.array([hand.at(q, grasp.X_WB).pad_centres[rows] for q in path])
+    return replace(made, guard=Guard(reach.fingers, FORCE_GOAL, made.time_of(contact_index)))

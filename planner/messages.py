@@ -18,26 +18,20 @@ from estimator.records import axis_record, contact_record, estimate_record
 from hand_models.hand import Hand
 from planner.explore import Step
 from planner.grasp_outcome import Grasp
-from planner.grasp_travel import GraspMotion
 from planner.optimum import ChoiceCertificate
 from planner.plan import Plan, Probe
 from planner.reach import Reach
 from planner.trajectory_messages import motion_record
 
 
-def plan_document(
-    hand: Hand,
-    plans: list[Plan],
-    grasp: Grasp | None = None,
-    grasp_motion: GraspMotion | None = None,
-) -> dict[str, Any]:
+def plan_document(hand: Hand, plans: list[Plan], grasp: Grasp | None = None) -> dict[str, Any]:
     """All placements that were planned, in order, and the grasp at the end, if there is one."""
     return {
         "hand": hand.name,
         "joint_names": list(hand.joint_names),
         "units": {"length": "m", "angle": "rad"},
         "rounds": [plan_record(plan) for plan in plans],
-        "grasp": None if grasp is None else grasp_record(hand, grasp, grasp_motion),
+        "grasp": None if grasp is None else grasp_record(hand, grasp),
     }
 
 
@@ -73,7 +67,7 @@ def _choice_record(choice: ChoiceCertificate) -> dict[str, Any]:
     return {name: _finite(value) for name, value in vars(choice).items()}
 
 
-def grasp_record(hand: Hand, grasp: Grasp, motion: GraspMotion | None = None) -> dict[str, Any]:
+def grasp_record(hand: Hand, grasp: Grasp) -> dict[str, Any]:
     """A grasp: the way in, joint angles open and closed, contacts, and how surely it holds."""
     return {
         "hand": hand.name,
@@ -104,7 +98,7 @@ def grasp_record(hand: Hand, grasp: Grasp, motion: GraspMotion | None = None) ->
             "torque_length": grasp.friction.torque_length,
         },
         "reach": reach_record(grasp.reach),
-        "motion": None if motion is None else motion_record(motion),
+        "motion": None if grasp.motion is None else motion_record(grasp.motion),
         "funnel": [{"reason": reason, "count": count} for reason, count in grasp.funnel],
     }
 

@@ -30,9 +30,8 @@ from planner.risk import risks
 from planner.round_motion import RoundMotion, plan_round
 from planner.solid import RevolvedSolid, believed_solid
 from planner.starts import Start
-from planner.surroundings import surroundings
 from planner.sweep import FROM, swept, with_swept
-from planner.transfer import Movable
+from planner.transfer import movable_among
 from planner.worth import Worth, guarded
 
 __all__ = ["NoPlan", "Plan", "Probe", "plan_preferred", "plan_probes"]
@@ -214,14 +213,9 @@ def _made(
     out = ways_out(tools.hand, tools.spheres, belief, reach.q_standoff, X_WB, np.asarray(place.n))
     if options.start is None:
         return _Made(reach, gentle, out[0], None)
-    motion = plan_round(_movable(tools, options, solid), gentle, out, options.start)
+    movable = movable_among(tools.hand, tools.collision, solid, options.reach, options.limits)
+    motion = plan_round(movable, gentle, out, options.start)
     return motion if isinstance(motion, str) else _Made(reach, gentle, motion.retreat, motion)
-
-
-def _movable(tools: HandTools, options: PlannerOptions, solid: RevolvedSolid) -> Movable:
-    rules = options.reach
-    around = surroundings(tools.collision, solid, rules.table, rules.boxes)
-    return Movable(tools.hand, around, options.limits, rules.workspace)
 
 
 def _plan(

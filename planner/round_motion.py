@@ -13,10 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pinocchio as pin
 
+from hand_models.hand import Hand
 from planner.motion import FORCE_GOAL, Approach
 from planner.motion_certificate import MotionCertificate, together
 from planner.retreat import Retreat
-from planner.timing import timed
+from planner.timing import MotionLimits, timed
 from planner.trajectory import Array, Configuration, Guard, Phase, Trajectory, between
 from planner.transfer import Movable, Transfer, plan_transfer
 
@@ -65,7 +66,7 @@ def plan_round(
     """
     probes, certificates = [], []
     for approach in approaches:
-        pair = probe_motion(movable, approach, ways[0].q)
+        pair = probe_motion(movable.hand, movable.limits, approach, ways[0].q)
         found = [movable.certify(one) for one in pair]
         faults = [fault for one in found for fault in one.faults]
         if faults:
@@ -88,15 +89,17 @@ def plan_round(
 
 
 def probe_motion(
-    movable: Movable, approach: Approach, q_begin: Array
+    hand: Hand, limits: MotionLimits, approach: Approach, q_begin: Array
 ) -> tuple[Trajectory, Trajectory]:
     """An approach in time, ended by its contact, and the way back from where that is expected.
 
     Raises:
         ValueError: The approach does not move.
     """
-    forward = _along(movable, approach, q_begin, np.arange(float(len(approach.path))), "approach")
-    back = withdrawal(movable, approach, approach.contact_index, q_begin)
+    forward = _along(
+        hand, limits, approach, q_begin, np.arange(float(len(approach.path))), "approach"
+    )
+    back = withdrawal(hand, limits, approach, approach.contact_index, q_begin)
     if forward is None or back is None:
         raise ValueError(f"the approach of {approach.finger} does not move")
     expected = forward.time_of(approach.contact_index)
@@ -105,7 +108,7 @@ def probe_motion(
 
 
 def withdrawal(
-    movable: Movable, approach: Approach, stop: float, q_begin: Array
+    hand: Hand, limits: MotionLimits, approach: Approach, stop: float, q_begin: Array
 ) -> Trajectory | None:
     """Back along an approach from where its finger stopped; None where it did not move.
 
@@ -114,11 +117,16 @@ def withdrawal(
         q_begin: Where the approach began.
     """
     places = np.append(stop, np.arange(int(np.ceil(stop)))[::-1])
-    return _along(movable, approach, q_begin, places, "withdraw")
+    return _along(hand, limits, approach, q_begin, places, "withdraw")
 
 
 def _along(
-    movable: Movable, approach: Approach, q_begin: Array, places: Array, phase: Phase
+    hand: Hand,
+    limits: MotionLimits,
+    approach: Approach,
+    q_begin: Array,
+    places: Array,
+    phase: Phase,
 ) -> Trajectory | None:
     """An approach's path in time, through places on it.
 
@@ -133,11 +141,11 @@ def _along(
     ]
     bases = tuple(_base_at(approach, float(place)) for place in places)
     made = timed(
-        movable.hand,
+        hand,
         phase,
         q,
         bases,
-        movable.limits,
+        limits,
         tips=tips[:, None],
         touching=(approach.finger,),
     )

@@ -13,10 +13,13 @@ from itertools import pairwise
 import numpy as np
 import pinocchio as pin
 
+from hand_models.collision import HandCollision
 from hand_models.hand import Hand
 from planner.motion_certificate import MotionCertificate, certify_motion
+from planner.reach_task import ReachOptions
 from planner.sampled_path import sampled_path
-from planner.surroundings import OBJECT, Surroundings
+from planner.solid import RevolvedSolid
+from planner.surroundings import OBJECT, Surroundings, surroundings
 from planner.timing import MotionLimits, timed
 from planner.trajectory import Array, Configuration, Trajectory, between
 from planner.workspace import Workspace
@@ -51,6 +54,18 @@ class Movable:
             self.hand, self.around, trajectory, self.limits,
             margin=margin, workspace=self.workspace,
         )  # fmt: skip
+
+
+def movable_among(
+    hand: Hand,
+    collision: HandCollision,
+    solid: RevolvedSolid,
+    rules: ReachOptions,
+    limits: MotionLimits,
+) -> Movable:
+    """A hand about a believed object, by the rules of its reach."""
+    around = surroundings(collision, solid, rules.table, rules.boxes)
+    return Movable(hand, around, limits, rules.workspace)
 
 
 @dataclass(frozen=True, eq=False)
