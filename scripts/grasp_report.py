@@ -70,9 +70,10 @@ def motion_in_words(motion: RoundMotion | GraspMotion) -> str:
     found = motion.certificate
     pair = min(found.nearest.values(), key=lambda pair: pair.distance)
     seconds = sum(one.duration for one in motion.trajectories)
+    round_it = ", round what is in the way" if motion.sampled else ""
     return (
-        f"motion of {seconds:.1f} s{', round what is in the way' if motion.sampled else ''}; nearest "
-        f"in {found.waypoints} waypoints: {pair.first} to {pair.second}, {1e3 * pair.distance:.1f} mm"
+        f"motion of {seconds:.1f} s{round_it}; nearest in {found.waypoints} waypoints: "
+        f"{pair.first} to {pair.second}, {1e3 * pair.distance:.1f} mm"
     )
 
 
