@@ -98,7 +98,9 @@ def closing_motion(
     rows = [hand.fingers.index(hand.finger(name)) for name in reach.fingers]
     tips = np.array([hand.at(q, reach.X_WB).pad_centres[rows] for q in path])
     bases = (reach.X_WB,) * len(path)
-    made = timed(hand, "close", path, bases, limits, tips=tips, touching=reach.fingers)
+    made = timed(
+        hand, "close", path, bases, limits, tips=tips, touching=reach.fingers, mark=contact_index
+    )
     if made is None:
         raise ValueError("the fingers of a grasp do not move")
     return replace(made, guard=Guard(reach.fingers, FORCE_GOAL, made.time_of(contact_index)))

@@ -136,19 +136,12 @@ def _along(
     path, rows = np.array(approach.path), np.arange(len(approach.path))
     path[0] = q_begin
     q = np.array([np.interp(places, rows, column) for column in path.T]).T
-    tips = np.array([np.interp(places, rows, column) for column in approach.tip_centres.T]).T[
-        :, None
-    ]
+    tips = np.array([np.interp(places, rows, column) for column in approach.tip_centres.T]).T
     bases = tuple(_base_at(approach, float(place)) for place in places)
     made = timed(
-        hand,
-        phase,
-        q,
-        bases,
-        limits,
-        tips=tips[:, None],
-        touching=(approach.finger,),
-    )
+        hand, phase, q, bases, limits, tips=tips[:, None], touching=(approach.finger,),
+        mark=approach.contact_index if phase == "approach" else None,
+    )  # fmt: skip
     if made is None:
         return None
     progress = np.interp(made.progress, np.arange(len(places)), places)

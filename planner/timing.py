@@ -22,6 +22,7 @@ from planner.trajectory import Array, Phase, Trajectory
 
 STEP = 5e-3  # between waypoints, of whatever moves farthest, at most [m]
 PAUSE = 0.1  # between waypoints, at most [s]
+GAIN = 0.25  # of a joint's speed between waypoints, at most [rad/s]
 _DENSE = 400  # times at which the motion is measured
 _UNBOUNDED = 1e3  # acceleration that is never reached
 _SAME = 1e-9  # of points of a path that are one
@@ -72,6 +73,7 @@ def timed(
     *,
     tips: Array | None = None,
     touching: tuple[str, ...] = (),
+    mark: int | None = None,
 ) -> Trajectory | None:
     """The fastest trajectory along a path; None where nothing moves.
 
@@ -81,6 +83,7 @@ def timed(
         tips: Places of m fingertips at each, (N, m, 3) [m]; where they are to touch they keep to
             `touch_speed`, otherwise to `near_speed`.
         touching: Fingers whose pads touch the object on the way.
+        mark: A point of the path that has to be a waypoint.
     Raises:
         ArithmeticError: TOPP-RA finds no speed for the path.
     """
@@ -96,7 +99,8 @@ def timed(
         *([] if tips is None else [tips[kept].reshape(kept.sum(), -1)]),
     ]
     motion = _motion(np.hstack(columns), hand, limits, phase)
-    times = _waypoints(hand, motion, float(motion.duration))
+    at = None if mark is None else float(np.interp(mark, np.flatnonzero(kept), place))
+    times = _waypoints(hand, motion, at)
     nq, rows = hand.model.nq, motion(times)
     progress = np.interp(rows[:, nq + 7], place, np.flatnonzero(kept))
     return Trajectory(
@@ -129,14 +133,20 @@ def _motion(path: Array, hand: Hand, limits: MotionLimits, phase: Phase) -> Any:
     return fastest(path[:, n + 7], path, limits.joint_speeds(hand), norms, most)
 
 
-def _waypoints(hand: Hand, motion: Any, duration: float) -> Array:
-    """Times between which nothing moves far."""
-    times = np.linspace(0.0, duration, _DENSE)
+def _waypoints(hand: Hand, motion: Any, mark: float | None) -> Array:
+    """Times between which nothing moves far, or gains much speed."""
+    times = np.linspace(0.0, float(motion.duration), _DENSE)
     rows, n = motion(times), hand.model.nq
     moved = travel(hand, rows[:, :n], _poses(rows[:, n : n + 7]))
-    measure = np.append(0.0, np.cumsum(moved / STEP + np.diff(times) / PAUSE))
+    gained = np.abs(np.diff(motion(times, 1)[:, :n], axis=0)).max(axis=1)
+    parts = moved / STEP + np.diff(times) / PAUSE + gained / GAIN
+    measure = np.append(0.0, np.cumsum(parts))
     count = max(2, 1 + int(np.ceil(measure[-1])))
-    return np.asarray(np.interp(np.linspace(0.0, measure[-1], count), measure, times))
+    chosen = np.interp(np.linspace(0.0, measure[-1], count), measure, times)
+    if mark is not None and count > 2:
+        passed = float(np.interp(mark, rows[:, n + 7], times))
+        chosen[1 + int(np.argmin(np.abs(chosen[1:-1] - passed)))] = passed
+    return np.asarray(chosen)
 
 
 def travel(hand: Hand, q: Array, bases: tuple[pin.SE3, ...]) -> Array:

@@ -226,7 +226,8 @@ def _camera(episode: Episode) -> Camera:
     away = unit(side + 0.3 * unit(hand) + np.array([0.0, 0.0, 0.4]))
     # a little below the middle: the caption covers the bottom of the picture
     target = episode.centre + 0.3 * hand - np.array([0.0, 0.0, 0.04])
-    distance = episode.half_height + 0.40
+    comes = any(act.motion is not None for act in episode.acts)  # from farther away
+    distance = episode.half_height + (0.52 if comes else 0.40)
     return Camera(frozen(target + distance * away), frozen(target))
 
 

@@ -150,7 +150,12 @@ def captions(episode: Episode, beats: tuple[Beat, ...]) -> list[dict[str, object
         before, after = (_sureness(episode, act, i) for i in (0, 1))
         felt = isinstance(act.outcome, Contact)
         doing = (f"{name} approaches", f"{name} {'touches' if felt else 'meets nothing'}")
-        lines.append(_caption(beat.start, doing[0], f"believed axis: {before}"))
+        begins = beat.start
+        if act.motion is not None and act.motion.come is not None:
+            head = f"Probe {number} of {len(episode.acts)}: the hand comes"
+            lines.append(_caption(beat.start, head, f"believed axis: {before}"))
+            begins = beat.approach
+        lines.append(_caption(begins, doing[0], f"believed axis: {before}"))
         learnt = [f"before: {before}", f"after: {after}", _felt(act), act.note]
         lines.append(_caption(beat.touch, doing[1], "\n".join(line for line in learnt if line)))
         lines.append(_caption(beat.retreat, f"{name} goes back", f"believed axis: {after}"))
