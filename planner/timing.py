@@ -143,7 +143,7 @@ def _waypoints(hand: Hand, motion: Any, mark: float | None) -> Array:
     measure = np.append(0.0, np.cumsum(parts))
     count = max(2, 1 + int(np.ceil(measure[-1])))
     chosen = np.interp(np.linspace(0.0, measure[-1], count), measure, times)
-    if mark is not None and count > 2:
+    if mark is not None and count > 2 and 0.0 < mark < 1.0:
         passed = float(np.interp(mark, rows[:, n + 7], times))
         chosen[1 + int(np.argmin(np.abs(chosen[1:-1] - passed)))] = passed
     return np.asarray(chosen)

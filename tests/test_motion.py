@@ -3,6 +3,7 @@
 from dataclasses import replace
 from itertools import pairwise
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -150,8 +151,6 @@ def raw_meshes_meet(q, X_WB, boxes):
         (i, j) for i in links for j in links
         if i < j and joints[i] not in above[joints[j]] and joints[j] not in above[joints[i]]
     ]  # fmt: skip
-    import coal
-
     for box in boxes:
         shape = coal.Box(*box.size)
         k = shapes.addGeometryObject(
