@@ -21,6 +21,8 @@ from planner.timing import MotionLimits, timed
 from planner.trajectory import Array, Configuration, Guard, Phase, Trajectory, between
 from planner.transfer import Movable, Transfer, plan_transfer
 
+OUTSIDE = 0.015  # from the believed object, at least, ends a way out [m]
+
 
 @dataclass(frozen=True, eq=False)
 class RoundMotion:
@@ -73,8 +75,10 @@ def plan_round(
             return f"{approach.finger}'s approach: {faults[0]}"
         probes.append(pair)
         certificates += found
-    reason = "there is no way out"
+    reason = "no straight way out leads away from the object"
     for way in ways:
+        if way.clearance < min(way.wanted, OUTSIDE):
+            continue
         outer = _outer(movable, way, start)
         if isinstance(outer, str):
             reason = outer

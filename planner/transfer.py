@@ -25,7 +25,7 @@ from planner.trajectory import Array, Configuration, Trajectory, between
 from planner.workspace import Workspace
 
 POINTS = 25  # of a straight piece of the path
-CHECKS = 6000  # of configurations, by the sampling planner, before it gives up
+CHECKS = 2500  # of configurations, by the sampling planner, before it gives up
 _WINDOWS = (0.4, 0.2, 0.1, 0.0)  # over which corners are rounded, shares of the path
 _SLACK = 1e-3  # nearer than the ends' own distance may the way be [m]
 
