@@ -9,7 +9,8 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from hand_models.collision import Body, HandCollision, LinkPair, revolved_slices
+from hand_models.bodies import Body
+from hand_models.collision import HandCollision, LinkPair, revolved_slices
 from planner.solid import RevolvedSolid
 from planner.trajectory import Array
 
