@@ -10,7 +10,7 @@ import numpy as np
 from hand_models.collision import LinkPair
 from hand_models.hand import Hand
 from planner.certificate import gap_in_words
-from planner.surroundings import OBJECT, Surroundings
+from planner.surroundings import OBJECT, ROOM, Surroundings
 from planner.timing import MotionLimits
 from planner.trajectory import Array, Trajectory
 from planner.workspace import Workspace
@@ -63,12 +63,14 @@ def certify_motion(
             and does not count.
         workspace: Where the base may be.
     """
-    room = np.minimum(trajectory.q - hand.lower, hand.upper - trajectory.q)
-    row, joint = np.unravel_index(int(np.argmin(room)), room.shape)
+    left = np.minimum(trajectory.q - hand.lower, hand.upper - trajectory.q)
+    row, joint = np.unravel_index(int(np.argmin(left)), left.shape)
     speed, acceleration = _shares(hand, trajectory, limits)
-    allowed = {OBJECT: -TOUCHING if trajectory.touching else margin}
+    room = ROOM if trajectory.phase == "transfer" else 0.0
+    allowed = {body.name: room for body in around.fixed}
+    allowed[OBJECT] = -TOUCHING if trajectory.touching else margin
     found = MotionCertificate(
-        len(trajectory), float(room[row, joint]), hand.joint_names[joint], speed, acceleration,
+        len(trajectory), float(left[row, joint]), hand.joint_names[joint], speed, acceleration,
         _nearest(around, trajectory), margin,
     )  # fmt: skip
     said = list(_faults(found, allowed))

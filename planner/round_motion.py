@@ -75,13 +75,13 @@ def plan_round(
             return f"{approach.finger}'s approach: {faults[0]}"
         probes.append(pair)
         certificates += found
-    reason = "no straight way out leads away from the object"
+    reason = ""
     for way in ways:
         if way.clearance < min(way.wanted, OUTSIDE):
             continue
         outer = _outer(movable, way, start)
         if isinstance(outer, str):
-            reason = outer
+            reason = reason or outer
             continue
         transfer, leave, found = outer
         enter = None if leave is None else _guarded_enter(movable, leave)
@@ -89,7 +89,7 @@ def plan_round(
             transfer.trajectory, enter, tuple(probes), leave, way,
             together([*certificates, *found]), transfer.sampled,
         )  # fmt: skip
-    return reason
+    return reason or "no straight way out leads away from the object"
 
 
 def probe_motion(

@@ -15,6 +15,7 @@ from planner.solid import RevolvedSolid
 from planner.trajectory import Array
 
 OBJECT, ITSELF = "the object", "itself"
+ROOM = 3e-3  # from table and boxes in free space: half of what is between waypoints, and more [m]
 _WIDER = 1.01  # than the object is what is around it [-]
 
 
@@ -87,11 +88,11 @@ class Surroundings:
             yield OBJECT, self.collision.nearest_to(q, X_WB, self.object, touching=touching)
 
     def is_free(self, q: Array, X_WB: pin.SE3, margin: float) -> bool:
-        """Whether nothing meets and the object is farther than a margin; stops at the first."""
+        """Whether nothing is near and the object farther than a margin; stops at the first."""
         if not self.collision.is_self_free(q):
             return False
         nearest = self.collision.nearest_to
-        if any(nearest(q, X_WB, body).distance < 0.0 for body in self.fixed):
+        if any(nearest(q, X_WB, body).distance < ROOM for body in self.fixed):
             return False
         return nearest(q, X_WB, self.object).distance >= margin
 

@@ -93,25 +93,28 @@ def timed(
     if kept.sum() < 2:
         return None
     place = length[kept] / length[-1]
-    columns = [
-        path[kept],
-        place[:, None],
-        *([] if tips is None else [tips[kept].reshape(kept.sum(), -1)]),
-    ]
-    motion = _motion(np.hstack(columns), hand, limits, phase)
+    told = np.empty((len(place), 0)) if tips is None else tips[kept].reshape(len(place), -1)
+    motion = _motion(np.hstack([path[kept], place[:, None], told]), hand, limits, phase)
     at = None if mark is None else float(np.interp(mark, np.flatnonzero(kept), place))
-    times = _waypoints(hand, motion, at)
+    times, slower = _waypoints(hand, motion, at), _slower(hand, motion, limits)
     nq, rows = hand.model.nq, motion(times)
-    progress = np.interp(rows[:, nq + 7], place, np.flatnonzero(kept))
     return Trajectory(
         phase=phase,
-        times=_frozen(times),
+        times=_frozen(slower * times),
         q=_frozen(np.clip(rows[:, :nq], hand.lower, hand.upper)),
-        velocities=_frozen(motion(times, 1)[:, :nq]),
+        velocities=_frozen(motion(times, 1)[:, :nq] / slower),
         bases=_poses(rows[:, nq : nq + 7]),
-        progress=_frozen(progress),
+        progress=_frozen(np.interp(rows[:, nq + 7], place, np.flatnonzero(kept))),
         touching=touching,
     )
+
+
+def _slower(hand: Hand, motion: Any, limits: MotionLimits) -> float:
+    """By how much time has to be stretched for what the optimiser's grid did not see."""
+    times, n = np.linspace(0.0, float(motion.duration), _DENSE), hand.model.nq
+    speed = np.max(np.abs(motion(times, 1)[:, :n]) / limits.joint_speeds(hand))
+    gain = np.max(np.abs(motion(times, 2)[:, :n])) / limits.joint_acceleration
+    return float(max(1.0, speed, np.sqrt(gain)))
 
 
 def _motion(path: Array, hand: Hand, limits: MotionLimits, phase: Phase) -> Any:

@@ -15,11 +15,12 @@ import pinocchio as pin
 
 from hand_models.collision import HandCollision
 from hand_models.hand import Hand
+from planner.certificate import gap_in_words
 from planner.motion_certificate import MotionCertificate, certify_motion
 from planner.reach_task import ReachOptions
 from planner.sampled_path import sampled_path
 from planner.solid import RevolvedSolid
-from planner.surroundings import OBJECT, Surroundings, surroundings
+from planner.surroundings import ITSELF, OBJECT, ROOM, Surroundings, surroundings
 from planner.timing import MotionLimits, timed
 from planner.trajectory import Array, Configuration, Trajectory, between
 from planner.workspace import Workspace
@@ -95,9 +96,9 @@ def plan_transfer(
     for word, place in (("where it starts", begin), ("where it ends", end)):
         near = dict(movable.around.pairs(place.q, place.X_WB))
         margin = min(margin, near.pop(OBJECT).distance - _SLACK)
-        for pair in near.values():
-            if pair.distance < 0.0:
-                return f"{pair.first} is in {pair.second} {word}"
+        for thing, pair in near.items():
+            if pair.distance < (0.0 if thing == ITSELF else ROOM):
+                return f"{gap_in_words(pair)} {word}"
     direct = _line(begin, end)
     straight = _timed(movable, direct, margin)
     if not isinstance(straight, str):
