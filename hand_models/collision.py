@@ -10,22 +10,21 @@ independent of it.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
-from itertools import combinations, pairwise
+from itertools import pairwise
 
 import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from hand_models.geometry import link_points, pad_in_joint
-from hand_models.hand import Finger, Hand, HandError
+from hand_models.bodies import Body
+from hand_models.collision_shapes import convex_hull, shapes_of
+from hand_models.hand import Hand
 
 Array = NDArray[np.float64]
 
-_HULL_OPTIONS = "Qt"  # qhull must triangulate, or coal cuts faces of more than three corners short
 _SIDES = 64  # of the polygon that stands for a parallel
 
 
@@ -67,11 +66,13 @@ class HandCollision:
 
     def __init__(self, hand: Hand) -> None:
         self.hand = hand
-        shapes = _shapes_of(hand)
+        shapes = shapes_of(hand)
         self._shapes, self._outer, self._pad_ids = shapes.model, shapes.outer, shapes.pads
         self._data = hand.model.createData()
         self._shape_data = pin.GeometryData(self._shapes)
         _start_afresh(self._shape_data)
+        self._geometries = [shape.geometry for shape in self._shapes.geometryObjects]
+        self._placed: tuple[Array, list[coal.Transform3s]] | None = None
 
     def is_self_free(self, q: ArrayLike) -> bool:
         """Whether no two links overlap; stops at the first that do."""
@@ -108,27 +109,63 @@ class HandCollision:
             slices: Convex parts of the object in its frame O, e.g. from `revolved_slices`.
             X_WO: Pose of the object.
         """
-        pin.updateGeometryPlacements(
-            self.hand.model, self._data, self._shapes, self._shape_data, np.asarray(q)
-        )
-        X_BO = X_WB.inverse() * X_WO
+        placed, there = self._placements(q), _transform(X_WB.inverse() * X_WO)
         links = [i for i in self._outer if i not in self._pad_ids]
         distances, pads = (
-            np.array([self._to_object(i, slices, X_BO) for i in ids])
+            np.array([self._distance(i, placed, slices, there) for i in ids])
             for ids in (links, self._pad_ids)
         )
         return ObjectClearance(tuple(self._link(i) for i in links), distances, pads)
 
-    def _to_object(
-        self, shape: int, slices: Sequence[coal.CollisionGeometry], X_BO: pin.SE3
+    def nearest_to(
+        self, q: ArrayLike, X_WB: pin.SE3, body: Body, *, touching: Collection[str] = ()
+    ) -> LinkPair:
+        """The link, or pad, nearest to a body.
+
+        Args:
+            q: (nq,) joint positions.
+            X_WB: Pose of the hand base.
+            body: The body.
+            touching: Fingers whose pads do not count.
+        """
+        placed, there = self._placements(q), _transform(X_WB.inverse() * body.X_WO)
+        pads = zip(self._pad_ids, self.hand.fingers, strict=True)
+        exempt = {i for i, finger in pads if finger.name in touching}
+        around = body.parts if body.around is None else (body.around,)
+        bounds = [
+            (self._distance(i, placed, around, there), i) for i in self._outer if i not in exempt
+        ]
+        least, nearest = min(bounds)
+        if body.around is not None:
+            least = np.inf
+            for bound, i in sorted(bounds):
+                if bound > least:
+                    break
+                exact = self._distance(i, placed, body.parts, there)
+                least, nearest = min((least, nearest), (exact, i))
+        return LinkPair(self._part(nearest), body.name, least)
+
+    def _placements(self, q: ArrayLike) -> list[coal.Transform3s]:
+        """Where each shape is in B; kept until the joints move."""
+        q = np.array(q, dtype=np.float64)
+        if self._placed is None or not np.array_equal(q, self._placed[0]):
+            pin.updateGeometryPlacements(
+                self.hand.model, self._data, self._shapes, self._shape_data, q
+            )
+            self._placed = (q, [_transform(X) for X in self._shape_data.oMg])
+        return self._placed[1]
+
+    def _distance(
+        self,
+        shape: int,
+        placed: list[coal.Transform3s],
+        parts: Sequence[coal.CollisionGeometry],
+        there: coal.Transform3s,
     ) -> float:
-        geometry = self._shapes.geometryObjects[shape].geometry
-        X_BS = self._shape_data.oMg[shape]
-        at = coal.Transform3s(X_BS.rotation, X_BS.translation)
-        there = coal.Transform3s(X_BO.rotation, X_BO.translation)
+        geometry, at = self._geometries[shape], placed[shape]
         request, result = coal.DistanceRequest(), coal.DistanceResult()
         nearest = np.inf
-        for part in slices:
+        for part in parts:
             result.clear()
             nearest = min(nearest, coal.distance(geometry, at, part, there, request, result))
         return float(nearest)
@@ -142,6 +179,12 @@ class HandCollision:
     def _named(self, pair: int, distance: float) -> LinkPair:
         ids = self._shapes.collisionPairs[pair]
         return LinkPair(self._link(int(ids.first)), self._link(int(ids.second)), distance)
+
+    def _part(self, shape: int) -> str:
+        """A pad by its finger, another shape by its link."""
+        if shape in self._pad_ids:
+            return f"the pad of {self.hand.fingers[self._pad_ids.index(shape)].name}"
+        return self._link(shape)
 
     def _link(self, shape: int) -> str:
         frame = self._shapes.geometryObjects[shape].parentFrame
@@ -170,62 +213,7 @@ def revolved_slices(z: ArrayLike, r: ArrayLike) -> tuple[coal.ConvexBase, ...]:
     reach = 0.5 * (1.0 + 1.0 / np.cos(np.pi / _SIDES))  # between in- and circumscribed
     circle = reach * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     rings = [np.column_stack([a * circle, np.full(_SIDES, b)]) for a, b in zip(r, z, strict=True)]
-    return tuple(_hull(np.vstack(pair)) for pair in pairwise(rings))
-
-
-class _Shapes:
-    """Hulls and pad spheres as one geometry model, and which of them meet what.
-
-    Attributes:
-        model: All shapes.
-        outer: Ids of those that meet objects.
-        inner: Ids of those that meet other links; of a pad whose link shows no mesh, its sphere.
-        pads: Ids of the pads' spheres.
-    """
-
-    def __init__(self, hand: Hand) -> None:
-        self.model = pin.GeometryModel()
-        self.outer: list[int] = []
-        self.inner: list[int] = []
-        self.pads: list[int] = []
-        whole = {self._add_link(hand, index) for index in range(hand.visual_model.ngeoms)}
-        for finger in hand.fingers:
-            self._add_pad(hand, finger, shown=pad_in_joint(hand, finger)[0] in whole)
-        for i, j in _pairs(hand.model, self.model, self.inner):
-            self.model.addCollisionPair(pin.CollisionPair(i, j))
-
-    def _add_link(self, hand: Hand, index: int) -> int:
-        """Adds one mesh; returns its joint if it shows a pad, else -1."""
-        visual = hand.visual_model.geometryObjects[index]
-        joint, points = int(visual.parentJoint), link_points(hand, index)
-        inside = _inside_pads(hand, joint, points)
-        outer = self._add_hull(visual, points[~inside])
-        inner = self._add_hull(visual, points) if np.any(inside) else outer
-        self.outer.extend(outer)
-        self.inner.extend(inner)
-        return joint if np.any(inside) and inner else -1
-
-    def _add_hull(self, visual: pin.GeometryObject, points: Array) -> list[int]:
-        if not _is_solid(points):
-            return []
-        name = f"{visual.name} {self.model.ngeoms}"
-        return [_add(self.model, name, visual.parentJoint, visual.parentFrame, _hull(points))]
-
-    def _add_pad(self, hand: Hand, finger: Finger, *, shown: bool) -> None:
-        joint, centre, _ = pad_in_joint(hand, finger)
-        at = pin.SE3(np.eye(3), centre)
-        sphere = coal.Sphere(finger.pad_radius)
-        pad = _add(self.model, f"pad of {finger.name}", joint, finger.tip_frame_id, sphere, at)
-        self.outer.append(pad)
-        self.pads.append(pad)
-        if not shown:
-            self.inner.append(pad)
-
-
-@lru_cache(maxsize=8)
-def _shapes_of(hand: Hand) -> _Shapes:
-    """What takes tens of milliseconds and is only read afterwards."""
-    return _Shapes(hand)
+    return tuple(convex_hull(np.vstack(pair)) for pair in pairwise(rings))
 
 
 def _start_afresh(data: pin.GeometryData) -> None:
@@ -239,57 +227,5 @@ def _start_afresh(data: pin.GeometryData) -> None:
                 request.gjk_initial_guess = coal.GJKInitialGuess.DefaultGuess
 
 
-def _inside_pads(hand: Hand, joint: int, points: Array) -> NDArray[np.bool_]:
-    """(N,) which of a joint's points lie in a pad's sphere."""
-    inside = np.zeros(len(points), dtype=np.bool_)
-    for finger in hand.fingers:
-        at, centre, _ = pad_in_joint(hand, finger)
-        if at == joint:
-            inside |= np.linalg.norm(points - centre, axis=1) <= 1.01 * finger.pad_radius
-    return inside
-
-
-def _add(
-    shapes: pin.GeometryModel,
-    name: str,
-    joint: int,
-    frame: int,
-    geometry: coal.CollisionGeometry,
-    at: pin.SE3 | None = None,
-) -> int:
-    at = pin.SE3.Identity() if at is None else at
-    shape = pin.GeometryObject(name, int(joint), int(frame), at, geometry)
-    return int(shapes.addGeometryObject(shape))
-
-
-def _pairs(
-    model: pin.Model, shapes: pin.GeometryModel, ids: Sequence[int]
-) -> list[tuple[int, int]]:
-    """Pairs of shapes that are not neighbours in the chain of joints."""
-    joints = {i: int(shapes.geometryObjects[i].parentJoint) for i in ids}
-
-    def near(i: int, j: int) -> bool:
-        """Whether j is i, its parent or its grandparent; the base has no parent but itself."""
-        parent = int(model.parents[i]) if i else 0
-        grandparent = int(model.parents[parent]) if parent else 0
-        return j in (i, parent, grandparent)
-
-    return [
-        (i, j)
-        for i, j in combinations(ids, 2)
-        if not near(joints[i], joints[j]) and not near(joints[j], joints[i])
-    ]
-
-
-def _is_solid(points: Array) -> bool:
-    return len(points) > 3 and np.linalg.matrix_rank(points[1:] - points[0], tol=1e-6) == 3
-
-
-def _hull(points: Array) -> coal.ConvexBase:
-    corners = coal.StdVec_Vec3s()
-    for point in points:
-        corners.append(point)
-    try:
-        return coal.Convex.convexHull(corners, True, _HULL_OPTIONS)
-    except RuntimeError as error:
-        raise HandError(f"no convex hull of {len(points)} points: {error}") from error
+def _transform(X: pin.SE3) -> coal.Transform3s:
+    return coal.Transform3s(X.rotation, X.translation)

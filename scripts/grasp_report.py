@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -13,11 +15,16 @@ from estimator.readers.raw_files import RawTouches
 from estimator.readers.raw_sensors import DepthPad, raw_sensor
 from estimator.surface import SurfaceOfRevolution
 from planner.explore import Step
+from planner.grasp_travel import GraspMotion
 from planner.plan import Probe
+from planner.round_motion import RoundMotion
 from sim_sensor.episode import Act, BelievedAxis, Episode, Grip
 from sim_sensor.feeling import Felt
+from sim_sensor.moves import ActMotion
 from sim_sensor.pictures import Signal
-from sim_sensor.world import World
+from sim_sensor.world import TouchRecord, World
+
+Motions = Callable[[Step, Sequence[TouchRecord]], Sequence[ActMotion | None]]
 
 
 def print_round(console: Console, step: Step, number: int) -> None:
@@ -41,6 +48,8 @@ def print_round(console: Console, step: Step, number: int) -> None:
             f"  worst case of the best pair {np.rad2deg(plan.bound.angle):.1f} deg, margin "
             f"{plan.margin:.2f} from: {plan.nearest}"
         )
+    if plan.motion is not None:
+        console.print(f"  {motion_in_words(plan.motion)}")
     if step.surprise is not None:
         console.print(f"  [bold yellow]Surprise[/]: {step.surprise}")
     estimate = step.after.estimate
@@ -54,6 +63,18 @@ def print_round(console: Console, step: Step, number: int) -> None:
         if estimate.verdict != "determined":
             for reason in estimate.reasons:
                 console.print(f"    {reason}")
+
+
+def motion_in_words(motion: RoundMotion | GraspMotion) -> str:
+    """How long it takes and how near the hand comes to anything it is not to touch."""
+    found = motion.certificate
+    pair = min(found.nearest.values(), key=lambda pair: pair.distance)
+    seconds = sum(one.duration for one in motion.trajectories)
+    round_it = ", round what is in the way" if motion.sampled else ""
+    return (
+        f"motion of {seconds:.1f} s{round_it}; nearest in {found.waypoints} waypoints: "
+        f"{pair.first} to {pair.second}, {1e3 * pair.distance:.1f} mm"
+    )
 
 
 def _felt(probe: Probe, contact: Contact) -> str:
@@ -80,14 +101,17 @@ def episode_of(
     conclusion: str,
     sensor: str = "",
     grip: Grip | None = None,
+    motions: Motions | None = None,
 ) -> Episode:
     """Each touch with the belief just before and just after it, and the grip at the end."""
     acts: list[Act] = []
     for step in steps:
-        belief = step.before
-        for probe, outcome in zip(step.plan.probes, step.outcomes, strict=True):
+        belief, records = step.before, world.records[len(acts) :][: len(step.outcomes)]
+        paced = [None] * len(records) if motions is None else motions(step, records)
+        for probe, outcome, record, motion in zip(
+            step.plan.probes, step.outcomes, records, paced, strict=True
+        ):
             after = update(belief, [outcome])
-            record = world.records[len(acts)]
             acts.append(
                 Act(
                     finger=probe.finger,
@@ -99,6 +123,7 @@ def episode_of(
                     after=BelievedAxis(after.axis, after.covariance),
                     note="" if record.felt is None else "; ".join(record.felt.flags),
                     signal=_shown(sensor, record.felt),
+                    motion=motion,
                 )
             )
             belief = after

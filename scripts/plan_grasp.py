@@ -22,6 +22,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +31,7 @@ import tyro
 from describe_hand import Options as DescribeOptions
 from describe_hand import describe
 from grasp_ending import Ending, ending, ending_record, grip_of, print_ending
+from grasp_moves import act_motions, from_home, left_at
 from grasp_report import episode_of, print_round, raw_touches
 from output_files import require_writable, write_json
 from rich.console import Console
@@ -151,6 +153,7 @@ def _scenario(options: Options) -> Scenario:
     rng = np.random.default_rng(options.seed)
     upright = Axis([0.5, 0.0, 0.2], [0.2 * rng.normal(), 0.2 * rng.normal(), 1.0])
     surface = SurfaceOfRevolution(upright, load_object(options.object))
+    hand = load_hand(options.hand)
     return Scenario(
         surface=surface,
         belief=coarse_view(
@@ -161,9 +164,9 @@ def _scenario(options: Options) -> Scenario:
         ),
         told=sensor_noise(options.sensor),
         world=World(surface, _mounted(options.sensor, surface, rng), rng=rng),
-        hand=load_hand(options.hand),
+        hand=hand,
         goal=Goal(np.deg2rad(options.goal_angle_deg), 1e-3 * options.goal_offset_mm),
-        planner=_planner_options(options),
+        planner=from_home(hand, _planner_options(options)),
         grasp=_grasp_options(options),
     )
 
@@ -246,11 +249,11 @@ def _conclude(
     )
     missing = scenario.goal.missing(belief) or unconfirmed
     reason = "" if met else reason or f"budget spent: {missing}"
-    rng = np.random.default_rng([options.seed, 2])
-    end = Ending()
+    rng, end = np.random.default_rng([options.seed, 2]), Ending()
     if met:
         with console.status("planning the grasp ..."):
-            end = ending(scenario.hand, belief, scenario.surface, scenario.grasp, rng=rng)
+            grasp = replace(scenario.grasp, start=left_at(steps, scenario.planner.start))
+            end = ending(scenario.hand, belief, scenario.surface, grasp, rng=rng)
         print_ending(console, end)
     result = {
         "goal_met": met,
@@ -276,6 +279,7 @@ def _conclude(
             episode = episode_of(
                 scenario.surface, scenario.world, steps, words, options.sensor,
                 grip_of(scenario.hand, end),
+                partial(act_motions, scenario.hand, scenario.planner.limits),
             )  # fmt: skip
             write_page(options.out / "probes.html", scenario.hand, episode)
         write_json(options.out / "plan.json", plans)
