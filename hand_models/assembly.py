@@ -5,7 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from hand_models.description import CopyDescription, HandDescription, SourceDescription
+from hand_models.description import (
+    ArmDescription,
+    CopyDescription,
+    HandDescription,
+    SourceDescription,
+)
 from hand_models.fields import HandError, Vector
 from hand_models.mjcf import read_mjcf
 from hand_models.part import Part, coupled, empty_part, grafted
@@ -15,7 +20,7 @@ _ONE_DEGREE = (1, 1)
 
 
 def assembled(description: HandDescription) -> Part:
-    """The hand's model and shapes, its followers following.
+    """The hand's model and shapes; its followers are still free joints, see `part.coupled`.
 
     Raises:
         HandError: A file that cannot be read, a link or joint that is not there, or a joint that
@@ -25,7 +30,22 @@ def assembled(description: HandDescription) -> Part:
     if description.copies:
         part = _repeated(part, description.copies)
     _check_joints(part.model)
-    return coupled(part)
+    return part
+
+
+def mounted(hand: Part, description: ArmDescription) -> tuple[Part, Part]:
+    """An arm, and the arm with a hand on its flange; followers following in both.
+
+    Args:
+        hand: Its followers not yet following.
+    Raises:
+        HandError: As for `assembled`; or a name that arm and hand share, and a prefix would part.
+    """
+    arm = _cut_out(read_part(description.source), description.source, description.prefix)
+    X_FB = placed(description.position, description.rotation_deg)
+    whole = grafted(arm, hand, link=description.prefix + description.flange, X_LB=X_FB)
+    _check_joints(whole.model)
+    return coupled(arm), coupled(whole)
 
 
 def read_part(source: SourceDescription) -> Part:
@@ -35,20 +55,28 @@ def read_part(source: SourceDescription) -> Part:
 
 def _source_part(source: SourceDescription) -> Part:
     part = read_part(source)
-    if source.base is None and not source.fixed:
+    if source.base is None and not source.without and not source.fixed:
         return part
-    return grafted(empty_part(), part, base=source.base, fixed=source.fixed)
+    return _cut_out(part, source)
+
+
+def _cut_out(part: Part, source: SourceDescription, prefix: str = "") -> Part:
+    return grafted(
+        empty_part(), part,
+        base=source.base, without=source.without, fixed=source.fixed, prefix=prefix,
+    )  # fmt: skip
 
 
 def _repeated(part: Part, copies: tuple[CopyDescription, ...]) -> Part:
     whole = empty_part()
     for copy in copies:
-        X_BC = _pose(copy.position, copy.rotation_deg)
+        X_BC = placed(copy.position, copy.rotation_deg)
         whole = grafted(whole, part, X_LB=X_BC, prefix=copy.prefix)
     return whole
 
 
-def _pose(position: Vector, rotation_deg: Vector) -> pin.SE3:
+def placed(position: Vector, rotation_deg: Vector) -> pin.SE3:
+    """A pose from position [m] and roll, pitch, yaw about the fixed axes, as in a URDF [deg]."""
     R = pin.rpy.rpyToMatrix(np.radians(np.array(rotation_deg)))
     return pin.SE3(R, np.array(position))
 

@@ -29,8 +29,11 @@ from hand_models.fields import (
     vector,
 )
 
-_SOURCE_KEYS = {"source", "distribution", "package_directories", "base", "fixed"}
-_HAND_KEYS = {*_SOURCE_KEYS, "name", "copies", "fingers"}
+_SOURCE_KEYS = {"source", "distribution", "package_directories", "base", "without", "fixed"}
+_HAND_KEYS = {*_SOURCE_KEYS, "name", "copies", "arm", "fingers"}
+_ARM_KEYS = {
+    *_SOURCE_KEYS, "prefix", "flange", "position", "rotation_deg", "at", "at_rotation_deg",
+}  # fmt: skip
 _COPY_KEYS = {"prefix", "position", "rotation_deg"}
 _FINGER_KEYS = {"name", "tip_frame", "pad_centre", "pad_normal", "pad_radius"}
 _ENDINGS = (".urdf", ".xml")
@@ -64,12 +67,14 @@ class SourceDescription:
         file: A URDF, or an MJCF if it ends in ".xml"; exists.
         package_directories: Folders in which the URDF's meshes are looked up.
         base: The link all else hangs on; None takes the whole.
+        without: Links that are left out, with all that hangs on them.
         fixed: Joints that are held, and where [rad], [m].
     """
 
     file: Path
     package_directories: tuple[Path, ...]
     base: str | None
+    without: tuple[str, ...]
     fixed: Mapping[str, float]
 
 
@@ -89,6 +94,27 @@ class CopyDescription:
 
 
 @dataclass(frozen=True)
+class ArmDescription:
+    """The `[arm]` table: what carries the hand.
+
+    Attributes:
+        source: Where its model comes from.
+        prefix: Put before its names, where they are the hand's, too.
+        flange: The link the hand is mounted on.
+        position, rotation_deg: Of the hand base in the flange [m], [deg].
+        at, at_rotation_deg: Of the arm's root in the world [m], [deg].
+    """
+
+    source: SourceDescription
+    prefix: str
+    flange: str
+    position: Vector
+    rotation_deg: Vector
+    at: Vector
+    at_rotation_deg: Vector
+
+
+@dataclass(frozen=True)
 class HandDescription:
     """A checked description, its files found.
 
@@ -96,12 +122,14 @@ class HandDescription:
         name: Name of the hand.
         source: Where its model comes from.
         copies: Where that stands; empty for once, at the hand base.
+        arm: What carries it; None leaves the hand free.
         fingers: At least one.
     """
 
     name: str
     source: SourceDescription
     copies: tuple[CopyDescription, ...]
+    arm: ArmDescription | None
     fingers: tuple[FingerDescription, ...]
 
 
@@ -153,6 +181,7 @@ def _checked(table: Mapping[str, Any], folder: Path, where: str) -> HandDescript
         name=text(table, "name", where),
         source=_source(table, folder, where),
         copies=_copies(table, where),
+        arm=_arm(table["arm"], folder, f"{where}: arm") if "arm" in table else None,
         fingers=_fingers(table, where),
     )
 
@@ -174,7 +203,11 @@ def _source(table: Mapping[str, Any], folder: Path, where: str) -> SourceDescrip
         if not directory.is_dir():
             raise HandError(f"{where}: package directory '{directory}' is not a folder")
     return SourceDescription(
-        file, directories, optional_text(table, "base", where), numbers(table, "fixed", where)
+        file,
+        directories,
+        optional_text(table, "base", where),
+        tuple(texts(table, "without", where, [])),
+        numbers(table, "fixed", where),
     )
 
 
@@ -210,6 +243,21 @@ def _copy(table: Mapping[str, Any], where: str) -> CopyDescription:
         prefix=text(table, "prefix", where),
         position=vector(table, "position", where, _NOWHERE),
         rotation_deg=vector(table, "rotation_deg", where, _NOWHERE),
+    )
+
+
+def _arm(table: object, folder: Path, where: str) -> ArmDescription:
+    if not isinstance(table, dict):
+        raise HandError(f"{where} must be a table, [arm], got {table!r}")
+    refuse_unknown_keys(table, _ARM_KEYS, where)
+    return ArmDescription(
+        source=_source(table, folder, where),
+        prefix=optional_text(table, "prefix", where) or "",
+        flange=text(table, "flange", where),
+        position=vector(table, "position", where, _NOWHERE),
+        rotation_deg=vector(table, "rotation_deg", where, _NOWHERE),
+        at=vector(table, "at", where, _NOWHERE),
+        at_rotation_deg=vector(table, "at_rotation_deg", where, _NOWHERE),
     )
 
 

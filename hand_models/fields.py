@@ -70,7 +70,7 @@ def numbers(table: Mapping[str, Any], key: str, where: str) -> dict[str, float]:
 def texts(table: Mapping[str, Any], key: str, where: str, default: list[str]) -> list[str]:
     value = table.get(key, default)
     if not isinstance(value, list) or not all(isinstance(entry, str) for entry in value):
-        raise HandError(f"{where}: {key} must be a list of paths, got {value!r}")
+        raise HandError(f"{where}: {key} must be a list of strings, got {value!r}")
     return value
 
 

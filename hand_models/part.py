@@ -7,7 +7,7 @@ so that a configuration holds independent joints only.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,6 +44,7 @@ def grafted(
     link: str = UNIVERSE,
     X_LB: pin.SE3 | None = None,
     base: str | None = None,
+    without: Collection[str] = (),
     fixed: Mapping[str, float] | None = None,
     prefix: str = "",
 ) -> Part:
@@ -53,6 +54,7 @@ def grafted(
         link: Link L of `onto`.
         X_LB: Pose of the base link in L.
         base: Link B of `part`; None takes all of it.
+        without: Links of `part` that are left out, with all that hangs on them.
         fixed: Joints of `part` that are held, and where [rad], [m].
         prefix: Put before the names of links and joints.
 
@@ -60,7 +62,8 @@ def grafted(
         HandError: No such link or joint, or a name that is there already.
     """
     fixed = {} if fixed is None else fixed
-    graft = _Graft(onto, part, fixed, prefix)
+    cut = {link_id(part.model, name) for name in without}
+    graft = _Graft(onto, part, cut, fixed, prefix)
     graft.run(link_id(onto.model, link), X_LB or pin.SE3.Identity(), base)
     unknown = [name for name in fixed if not part.model.existJointName(name)]
     if unknown:
@@ -95,9 +98,11 @@ def link_id(model: pin.Model, name: str) -> int:
 class _Graft:
     """Copies frame by frame; parents come before children in a Pinocchio model."""
 
-    def __init__(self, onto: Part, part: Part, fixed: Mapping[str, float], prefix: str) -> None:
+    def __init__(
+        self, onto: Part, part: Part, cut: set[int], fixed: Mapping[str, float], prefix: str
+    ) -> None:
         self.model, self.shapes = pin.Model(onto.model), onto.shapes.copy()
-        self._part, self._fixed, self._prefix = part, fixed, prefix
+        self._part, self._cut, self._fixed, self._prefix = part, cut, fixed, prefix
         self._frames: dict[int, int] = {}  # the part's to ours
         self._joints: dict[int, tuple[int, pin.SE3]] = {}  # to ours, and the pose in its frame
 
@@ -113,7 +118,7 @@ class _Graft:
         for index in range(root + 1, source.nframes):
             frame = source.frames[index]
             above = self._frames.get(int(frame.parentFrame))
-            if above is not None:
+            if above is not None and index not in self._cut:
                 add = self._add_joint if frame.type == pin.FrameType.JOINT else self._add_frame
                 self._frames[index] = add(frame, above)
         self._add_shapes()

@@ -57,7 +57,7 @@ def propose_description(file: Path, *, base: str | None = None) -> Proposal:
     if not file.is_file():
         raise HandError(f"'{file}' is not a file")
     folders = (_package_folder(file),)
-    whole = read_part(SourceDescription(file, folders, base, {}))
+    whole = read_part(SourceDescription(file, folders, base, (), {}))
     doubts = []
     if base is None:
         palms = _palms(whole.model)

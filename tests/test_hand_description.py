@@ -139,7 +139,7 @@ WRONG_FIELDS = [
     (
         'source = "planar.urdf"',
         'source = "planar.urdf"\npackage_directories = "meshes"',
-        "package_directories must be a list of paths, got 'meshes'",
+        "package_directories must be a list of strings, got 'meshes'",
     ),
     ('source = "planar.urdf"', 'source = "planar.urdf"\nurl = ""', "unknown key 'url'; allowed"),
     ('"nail"', '"tip"', "no link 'tip' for tip_frame; links are base, .*distal, nail"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 from functools import lru_cache
 
 import casadi as ca
@@ -172,7 +173,7 @@ def test_a_hand_is_free_of_itself_in_many_postures(name):
 
 def test_what_is_cut_out_of_a_robot_stands_as_it_did_there():
     source = read_description("dex3_right").source
-    whole = read_part(source.__class__(source.file, source.package_directories, None, {}))
+    whole = read_part(replace(source, base=None))
     hand = hand_named("dex3_right")
     data = whole.model.createData()
     q_whole = pin.neutral(whole.model)
