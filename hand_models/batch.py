@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from hand_models.hand import Hand
@@ -46,11 +47,16 @@ def batch_placements(hand: Hand, q: Array) -> BatchPlacements:
     Args:
         q: (N, nq) joint positions [rad], [m] if prismatic.
     """
-    n, count = len(q), hand.model.njoints
+    return model_placements(hand.model, q)
+
+
+def model_placements(model: pin.Model, q: Array) -> BatchPlacements:
+    """The same for any model of joints with one degree of freedom, in its universe."""
+    n, count = len(q), model.njoints
     R = np.broadcast_to(np.eye(3), (n, count, 3, 3)).copy()
     p = np.zeros((n, count, 3))
-    for j, motion in enumerate(joint_motions(hand.model), start=1):  # parents before children
-        parent, fixed = int(hand.model.parents[j]), hand.model.jointPlacements[j]
+    for j, motion in enumerate(joint_motions(model), start=1):  # parents before children
+        parent, fixed = int(model.parents[j]), model.jointPlacements[j]
         turn, shift = _moved(motion, motion.at(q))
         R_fixed = R[:, parent] @ fixed.rotation
         R[:, j] = R_fixed @ turn

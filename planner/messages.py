@@ -48,6 +48,7 @@ def plan_record(plan: Plan) -> dict[str, Any]:
         "reach": reach_record(reach),
         "retreat": {
             "joint_positions": plan.retreat.q.tolist(),
+            "joint_path": plan.retreat.path.tolist(),
             "base_poses": [pose_record(X) for X in plan.retreat.bases],
             "clearance": plan.retreat.clearance,
             "wanted": plan.retreat.wanted,
