@@ -14,6 +14,7 @@ from estimator.readers.raw_sensors import DepthPad, raw_sensor
 from estimator.surface import SurfaceOfRevolution
 from planner.explore import Step
 from planner.plan import Probe
+from planner.risk import risks_in_words
 from sim_sensor.episode import Act, BelievedAxis, Episode, Grip
 from sim_sensor.feeling import Felt
 from sim_sensor.pictures import Signal
@@ -41,6 +42,10 @@ def print_round(console: Console, step: Step, number: int) -> None:
             f"  worst case of the best pair {np.rad2deg(plan.bound.angle):.1f} deg, margin "
             f"{plan.margin:.2f} from: {plan.nearest}"
         )
+    if plan.choice is not None:
+        console.print(f"  {plan.choice.words}")
+    if plan.risks:
+        console.print(f"  {risks_in_words(plan.risks)}")
     if step.surprise is not None:
         console.print(f"  [bold yellow]Surprise[/]: {step.surprise}")
     estimate = step.after.estimate
