@@ -67,7 +67,7 @@ class Options:
     """Hand: allegro_right, allegro_left, or the path of a description (.toml)."""
     object: str = "can"
     """What is touched: a built-in name (can, bottle, cone, cup, barrel, jar-lid, knob, vase, egg,
-    spindle, paper-lathe, sphere) or a CSV file with columns r_mm,z_mm."""
+    spindle, paper-lathe, sphere), a CSV file with columns r_mm,z_mm or a product's JSON file."""
     sensor: str = "gel"
     """Tactile sensor. Readings with noise: ideal, fearing1988, robotworld, taxel, gel, gel-good,
     gel-poor. Raw signals, simulated and read: fearing-strain, gel-depth, taxel-array."""
