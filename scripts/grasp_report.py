@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
+from worlds import raw_sensor_of
 
 from estimator.belief import update
 from estimator.contact import Contact, Miss
@@ -18,6 +21,9 @@ from sim_sensor.episode import Act, BelievedAxis, Episode, Grip
 from sim_sensor.feeling import Felt
 from sim_sensor.pictures import Signal
 from sim_sensor.world import World
+
+if TYPE_CHECKING:
+    from sim_sensor.mujoco_world import MujocoWorld
 
 
 def print_round(console: Console, step: Step, number: int) -> None:
@@ -75,7 +81,7 @@ def _shown(sensor: str, felt: Felt | None) -> Signal | None:
 
 def episode_of(
     surface: SurfaceOfRevolution,
-    world: World,
+    world: World | MujocoWorld,
     steps: list[Step],
     conclusion: str,
     sensor: str = "",
@@ -105,7 +111,7 @@ def episode_of(
     return Episode(surface, tuple(acts), conclusion=conclusion, grip=grip)
 
 
-def raw_touches(sensor: str, steps: list[Step], world: World) -> RawTouches | None:
+def raw_touches(sensor: str, steps: list[Step], world: World | MujocoWorld) -> RawTouches | None:
     """The raw signals of all touches that met the object; None where the sensor has none."""
     probes = [probe for step in steps for probe in step.plan.probes]
     felt = [
@@ -118,7 +124,7 @@ def raw_touches(sensor: str, steps: list[Step], world: World) -> RawTouches | No
     signals = np.array([one.signal for _, one in felt])
     poses = np.array([one.X_WS for _, one in felt])
     fingers = tuple(finger for finger, _ in felt)
-    kind = raw_sensor(sensor).kind
+    kind = raw_sensor_of(world, sensor).kind
     if isinstance(kind, DepthPad):
         return RawTouches(
             poses, depth=signals, pixel_pitch=kind.pixel_pitch, pad_radius=kind.radius,

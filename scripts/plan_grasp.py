@@ -24,6 +24,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
@@ -32,12 +33,12 @@ from grasp_ending import Ending, ending, ending_record, grip_of, print_ending
 from grasp_report import episode_of, print_round, raw_touches
 from output_files import require_writable, write_whole
 from rich.console import Console
+from worlds import build_world, pose_in, sensor_in
 
-from estimator.axis import Axis, angle_between, offset_at
+from estimator.axis import angle_between, offset_at
 from estimator.belief import Belief
 from estimator.contact import Contact, Miss, SensorNoise
 from estimator.readers.raw_files import write_raw
-from estimator.readers.raw_sensors import RAW_SENSORS
 from estimator.records import estimate_record
 from estimator.sensors import sensor_noise
 from estimator.surface import SurfaceOfRevolution
@@ -51,12 +52,12 @@ from planner.options import PlannerOptions
 from planner.plan import NoPlan, Probe
 from planner.workspace import Workspace
 from sim_sensor.camera import coarse_view
-from sim_sensor.feeling import Sense
-from sim_sensor.noise import Session, simulated_sensor
 from sim_sensor.objects import load_object
-from sim_sensor.raw_sense import raw_sense
 from sim_sensor.view import write_page
 from sim_sensor.world import World
+
+if TYPE_CHECKING:
+    from sim_sensor.mujoco_world import MujocoWorld
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,9 @@ class Options:
     sensor: str = "gel"
     """Tactile sensor. Readings with noise: ideal, fearing1988, robotworld, taxel, gel, gel-good,
     gel-poor. Raw signals, simulated and read: fearing-strain, gel-depth, taxel-array."""
+    world: str = "own"
+    """Where the touches happen: own, or MuJoCo with the object held (mujoco) or standing free on a
+    table (mujoco-table); pads are then domes of gel, --sensor gel-depth."""
     prior_angle_deg: float = 15.0
     """How far the camera's axis is off in direction."""
     prior_offset_mm: float = 15.0
@@ -104,7 +108,7 @@ class Scenario:
     surface: SurfaceOfRevolution
     belief: Belief
     told: SensorNoise
-    world: World
+    world: World | MujocoWorld
     hand: Hand
     goal: Goal
     planner: PlannerOptions
@@ -115,6 +119,7 @@ def main() -> int:
     options = tyro.cli(Options, description=__doc__)
     console = Console()
     try:
+        options = replace(options, sensor=sensor_in(options.world, options.sensor))
         scenario = _scenario(options)
         require_writable(options.out)
     except (ValueError, HandError) as error:
@@ -144,8 +149,8 @@ def _scenario(options: Options) -> Scenario:
     if options.seed < 0:
         raise ValueError(f"--seed: expected a number >= 0, got {options.seed}")
     rng = np.random.default_rng(options.seed)
-    upright = Axis([0.5, 0.0, 0.2], [0.2 * rng.normal(), 0.2 * rng.normal(), 1.0])
-    surface = SurfaceOfRevolution(upright, load_object(options.object))
+    surface = SurfaceOfRevolution(pose_in(options.world, rng), load_object(options.object))
+    hand = load_hand(options.hand)
     return Scenario(
         surface=surface,
         belief=coarse_view(
@@ -155,19 +160,12 @@ def _scenario(options: Options) -> Scenario:
             rng=rng,
         ),
         told=sensor_noise(options.sensor),
-        world=World(surface, _mounted(options.sensor, surface, rng), rng=rng),
-        hand=load_hand(options.hand),
+        world=build_world(options.world, hand, surface, options.sensor, rng),
+        hand=hand,
         goal=Goal(np.deg2rad(options.goal_angle_deg), 1e-3 * options.goal_offset_mm),
         planner=_planner_options(options),
         grasp=_grasp_options(options),
     )
-
-
-def _mounted(name: str, surface: SurfaceOfRevolution, rng: np.random.Generator) -> Session | Sense:
-    """The sensor that feels the world, raw or at reading level."""
-    if name in RAW_SENSORS:
-        return raw_sense(name, surface, rng=rng)
-    return simulated_sensor(name).session(rng=rng)
 
 
 def _planner_options(options: Options) -> PlannerOptions:
@@ -229,8 +227,8 @@ def _conclude(
     belief = steps[-1].after if steps else scenario.belief
     unconfirmed = steps[-1].surprise if steps else None
     met = scenario.goal.met_by(belief) and unconfirmed is None
-    truth = scenario.surface.axis
-    middle = _middle(scenario.surface)
+    surface = scenario.world.surface
+    truth, middle = surface.axis, _middle(surface)
     error = {
         "angle_deg": float(np.rad2deg(angle_between(belief.axis, truth))),
         "offset_mm": 1e3 * offset_at(belief.axis, truth, middle),
@@ -245,7 +243,7 @@ def _conclude(
     end = Ending()
     if met:
         with console.status("planning the grasp ..."):
-            end = ending(scenario.hand, belief, scenario.surface, scenario.grasp, rng=rng)
+            end = ending(scenario.hand, belief, surface, scenario.grasp, rng=rng)
         print_ending(console, end)
     result = {
         "goal_met": met,
@@ -257,6 +255,7 @@ def _conclude(
         "truth": {
             "axis": {"point": truth.point.tolist(), "direction": truth.direction.tolist()},
             "object": options.object,
+            "world": options.world,
         },
         "error": error,
         "goal": {"angle_deg": options.goal_angle_deg, "offset_mm": options.goal_offset_mm},
@@ -271,7 +270,7 @@ def _conclude(
         if steps:
             words = f"{error['angle_deg']:.2f} deg and {error['offset_mm']:.2f} mm from the truth"
             episode = episode_of(
-                scenario.surface, scenario.world, steps, words, options.sensor,
+                surface, scenario.world, steps, words, options.sensor,
                 grip_of(scenario.hand, end),
             )  # fmt: skip
             write_page(options.out / "probes.html", scenario.hand, episode)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import RectBivariateSpline
 
-from estimator.profile import SplineProfile
+from estimator.profile import Profile, SplineProfile
 from estimator.surface import Geometry, SurfaceOfRevolution
 from estimator.vectors import Array, cross, unit
 
@@ -69,11 +69,17 @@ def scan_of(name: str, profile: SplineProfile, residuals: ArrayLike) -> Scan:
     return Scan(name, profile, RectBivariateSpline(heights, angles, closed))
 
 
+def wall_radius(profile: Profile, theta: Array, z: Array) -> Array:
+    """Distance of the wall from the axis [m], with its dents if it has any."""
+    if isinstance(profile, Scan):
+        return profile.radius(theta, z)
+    return np.asarray(profile.derivatives(z)[0])
+
+
 def wall_points(surface: SurfaceOfRevolution, theta: Array, z: Array) -> Array:
-    """Points of the wall in the world [m], (..., 3), with its dents if it has any."""
+    """Points of the wall in the world [m], (..., 3), with its dents."""
     theta, z = np.broadcast_arrays(theta, z)
-    profile = surface.profile
-    r = profile.radius(theta, z) if isinstance(profile, Scan) else profile.derivatives(z)[0]
+    r = wall_radius(surface.profile, theta, z)
     local = np.stack([r * np.cos(theta), r * np.sin(theta), z], axis=-1)
     return np.asarray(surface.axis.point + local @ surface.frame)
 

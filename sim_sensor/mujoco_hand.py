@@ -1,0 +1,128 @@
+"""A hand of a Pinocchio model in MuJoCo: its joints with position actuators, links and pads.
+
+The base is placed from outside (an arm that holds it ideally); gravity on the hand is compensated.
+Links are the convex hulls of their visual meshes, pads are soft spheres; links do not collide with
+each other, which the planner has checked on its own shapes.
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+
+from estimator.vectors import Array
+from hand_models.geometry import link_points, pad_in_joint
+from hand_models.hand import Hand
+
+BASE = "base"
+ARMATURE = 2e-3  # of the gears [kg m^2] or [kg]
+STIFFNESS = {True: 20.0, False: 2e4}  # of actuators: turning [Nm/rad], sliding [N/m]
+DAMPING = {True: 1.0, False: 300.0}
+PAD_SOLREF, PAD_SOLIMP = (-150.0, -30.0), (0.5, 0.5, 1e-3, 0.5, 2.0)  # 0.5 N press about 1 mm
+_LIGHTEST = 1e-3  # link [kg]
+_OWN_PAD = 1.08  # points of a tip's mesh within so many pad radii are the pad's own
+_FLAT = 1e-3  # least extent of a hull, as a singular value [m]
+_TOUCHABLE, _TOUCHES = 0, 1  # contype and conaffinity: a hand meets objects, not itself
+
+
+def add_hand(spec: mujoco.MjSpec, hand: Hand, *, links: bool) -> None:
+    """The hand as bodies of a spec: joints, actuators and pads under its own names.
+
+    Args:
+        links: With the links' hulls; without, only pads collide.
+    """
+    base = spec.worldbody.add_body(name=BASE, mocap=True)
+    bodies = [base]
+    for j in range(1, hand.model.njoints):
+        parent = bodies[hand.model.parents[j]]
+        bodies.append(_add_joint(spec, parent, hand.model, j))
+    for row, finger in enumerate(hand.fingers):
+        joint, centre, _ = pad_in_joint(hand, finger)
+        bodies[joint].add_geom(
+            name=pad_name(hand.fingers[row].name), type=mujoco.mjtGeom.mjGEOM_SPHERE, pos=centre,
+            size=[finger.pad_radius, 0.0, 0.0], mass=_LIGHTEST, contype=_TOUCHABLE,
+            conaffinity=_TOUCHES, solref=PAD_SOLREF, solimp=PAD_SOLIMP, priority=1, condim=4,
+            friction=[1.0, 5e-3, 1e-4],
+        )  # fmt: skip
+    if links:
+        _add_links(spec, hand, bodies)
+
+
+def pad_name(finger: str) -> str:
+    return f"pad/{finger}"
+
+
+def link_name(geom: str) -> str:
+    """The link's name in the description, from that of its geom here."""
+    return geom.removeprefix("link/").rsplit("_", 1)[0]
+
+
+def place_base(data: mujoco.MjData, X_WB: pin.SE3) -> None:
+    """Put the hand's base where the arm holds it."""
+    data.mocap_pos[0] = X_WB.translation
+    mujoco.mju_mat2Quat(data.mocap_quat[0], np.ascontiguousarray(X_WB.rotation).ravel())
+
+
+def _add_joint(
+    spec: mujoco.MjSpec, parent: mujoco.MjsBody, model: pin.Model, j: int
+) -> mujoco.MjsBody:
+    name, X, inertia = model.names[j], model.jointPlacements[j], model.inertias[j]
+    body = parent.add_body(name=name, pos=X.translation, quat=_quat(X.rotation), gravcomp=1.0)
+    body.explicitinertial = True
+    body.mass, body.ipos = max(float(inertia.mass), _LIGHTEST), np.array(inertia.lever)
+    about = np.asarray(inertia.inertia) + 1e-7 * np.eye(3)
+    body.fullinertia = about[(0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)]
+    axis, turns = _motion(model, j)
+    k = model.joints[j].idx_q
+    kind = mujoco.mjtJoint.mjJNT_HINGE if turns else mujoco.mjtJoint.mjJNT_SLIDE
+    low, high = float(model.lowerPositionLimit[k]), float(model.upperPositionLimit[k])
+    body.add_joint(
+        name=name, type=kind, axis=axis, armature=ARMATURE, range=[low, high],
+        limited=mujoco.mjtLimited.mjLIMITED_TRUE,
+    )  # fmt: skip
+    actuator = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    actuator.set_to_position(kp=STIFFNESS[turns], kv=DAMPING[turns])
+    return body
+
+
+def _motion(model: pin.Model, j: int) -> tuple[Array, bool]:
+    """A joint's axis in its own frame, and whether it turns about it."""
+    data = model.createData()
+    J = pin.computeJointJacobian(model, data, pin.neutral(model), j)
+    twist = np.asarray(J[:, model.joints[j].idx_v])
+    turns = bool(np.linalg.norm(twist[3:]) > 0.5)
+    return (twist[3:] if turns else twist[:3]), turns
+
+
+def _add_links(spec: mujoco.MjSpec, hand: Hand, bodies: list[mujoco.MjsBody]) -> None:
+    for i, shape in enumerate(hand.visual_model.geometryObjects):
+        points = _without_pads(hand, int(shape.parentJoint), link_points(hand, i))
+        if (
+            len(points) < 4
+            or np.linalg.svd(points - points.mean(axis=0), compute_uv=False)[-1] < _FLAT
+        ):
+            continue  # nothing is left of a tip beside its pad
+        name = f"link/{shape.name}"
+        mesh = spec.add_mesh(name=name)
+        mesh.uservert, mesh.maxhullvert = points.ravel(), 64
+        bodies[shape.parentJoint].add_geom(
+            name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, mass=0.0,
+            contype=_TOUCHABLE, conaffinity=_TOUCHES,
+        )  # fmt: skip
+
+
+def _without_pads(hand: Hand, joint: int, points: Array) -> Array:
+    """Points of a link outside the pads on it: a tip is round where it touches."""
+    for finger in hand.fingers:
+        at, centre, _ = pad_in_joint(hand, finger)
+        if at == joint:
+            off = np.linalg.norm(points - centre, axis=1)
+            points = points[off > _OWN_PAD * finger.pad_radius]
+    return points
+
+
+def _quat(R: Array) -> Array:
+    quat = np.empty(4)
+    mujoco.mju_mat2Quat(quat, np.ascontiguousarray(R).ravel())
+    return quat
