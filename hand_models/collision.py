@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 
 import coal
@@ -63,9 +64,7 @@ class HandCollision:
 
     def __init__(self, hand: Hand) -> None:
         self.hand = hand
-        self._shapes, self._pad_ids = _convex_shapes(hand)
-        for i, j in _pairs(hand.model, self._shapes):
-            self._shapes.addCollisionPair(pin.CollisionPair(i, j))
+        self._shapes, self._pad_ids = _shapes_and_pairs(hand)
         self._data = hand.model.createData()
         self._shape_data = pin.GeometryData(self._shapes)
 
@@ -163,6 +162,15 @@ def revolved_slices(z: ArrayLike, r: ArrayLike) -> tuple[coal.ConvexBase, ...]:
     circle = reach * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     rings = [np.column_stack([a * circle, np.full(_SIDES, b)]) for a, b in zip(r, z, strict=True)]
     return tuple(_hull(np.vstack(pair)) for pair in pairwise(rings))
+
+
+@lru_cache(maxsize=8)
+def _shapes_and_pairs(hand: Hand) -> tuple[pin.GeometryModel, tuple[int, ...]]:
+    """What takes tens of milliseconds and is only read afterwards."""
+    shapes, pad_ids = _convex_shapes(hand)
+    for i, j in _pairs(hand.model, shapes):
+        shapes.addCollisionPair(pin.CollisionPair(i, j))
+    return shapes, pad_ids
 
 
 def _convex_shapes(hand: Hand) -> tuple[pin.GeometryModel, tuple[int, ...]]:

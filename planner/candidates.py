@@ -1,15 +1,15 @@
 """Contacts this hand can really make: postures of the hand laid onto the believed surface.
 
 Idea: a posture fixes where the pads are relative to each other. Laying it onto the surface leaves
-the six coordinates of the hand's base, which are found for thousands of postures at once: pads on
-the surface, pad normals against it, heights inside the object. What comes out is a set of contact
-triples with the joint angles and the base pose that nearly make them; `reach` makes them exact.
+the six coordinates of the hand's base, which are found for hundreds of postures at once: pads on
+the surface, pad normals against it, heights inside the object. They start from what the hand can
+do on cylinders of that radius (`reach_map`). What comes out is a set of contact triples with the
+joint angles and the base pose that nearly make them; `reach` makes them exact.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import combinations
 
 import numpy as np
 import pinocchio as pin
@@ -18,12 +18,13 @@ from estimator.surface import SurfaceOfRevolution
 from estimator.vectors import Array, Index, Mask, unit
 from hand_models.batch import batch_placements
 from hand_models.hand import Hand
-from hand_models.postures import Postures
 from hand_models.spheres import LinkSpheres
 from planner.laying import Laid, lay
+from planner.reach_map import ReachMap
 from planner.workspace import Workspace
 
 END_MARGIN = 0.08  # of the believed height, kept from both ends
+FITTING = 5  # steps from a cylinder to the believed surface
 TURNS = 48  # about the object's axis, where the base is bounded
 GAP = 2e-3  # of a laid pad from the surface that reach will close [m]
 INTRUSION = 4e-3  # of a link sphere into the believed object that reach will remove [m]
@@ -71,12 +72,9 @@ class Candidates:
 
 
 def placement_candidates(
-    hand: Hand,
-    postures: Postures,
-    spheres: LinkSpheres,
+    reach_map: ReachMap,
     surface: SurfaceOfRevolution,
     *,
-    cone: float,
     count: int,
     rng: np.random.Generator,
     workspace: Workspace | None = None,
@@ -85,16 +83,15 @@ def placement_candidates(
     """Placements with several fingers on the surface at once.
 
     Args:
-        cone: Largest angle between pad normal and inward surface normal [rad].
-        count: How many postures are laid on.
+        reach_map: Of the hand; its cone holds here, too.
+        count: How many of its placements are fitted to the surface.
         fingers_at_once: Contacts per placement, at most the hand's fingers.
         workspace: Where the hand's base may be; free where None.
     """
-    ways = np.array(list(combinations(range(len(hand.fingers)), fingers_at_once)), dtype=np.intp)
-    fingers = ways[rng.integers(len(ways), size=count)]
-    chosen = rng.choice(len(postures), size=count, replace=count > len(postures))
-    laid = lay(hand, surface, postures.q[chosen], fingers, cone=cone, rng=rng)
-    return _kept(hand, fingers, spheres, surface, laid, cone, workspace or Workspace())
+    hand, cone = reach_map.hand, reach_map.cone
+    poses, fingers = reach_map.draw(surface, fingers_at_once, count=count, rng=rng)
+    laid = lay(hand, surface, poses, fingers, cone=cone, iterations=FITTING)
+    return _kept(hand, fingers, reach_map.spheres, surface, laid, cone, workspace or Workspace())
 
 
 def _kept(
@@ -121,7 +118,7 @@ def _kept(
         ("base outside its workspace", workspace.allows(R_WB, p_WB)),
     )
     alive = np.arange(len(q))
-    rejected = [("placements laid", len(q))]
+    rejected = [("placements fitted", len(q))]
     for reason, passed in tests:
         rejected.append((reason, int(np.sum(~passed[alive]))))
         alive = alive[passed[alive]]
@@ -187,12 +184,9 @@ def clear_of_object(
 
 
 def single_candidates(
-    hand: Hand,
-    postures: Postures,
-    spheres: LinkSpheres,
+    reach_map: ReachMap,
     surface: SurfaceOfRevolution,
     *,
-    cone: float,
     count: int,
     rng: np.random.Generator,
     workspace: Workspace | None = None,
@@ -200,8 +194,9 @@ def single_candidates(
     """Placements of the hand with one finger on the surface: every place an arm can bring it to.
 
     The pad is put at a random place with its normal within half the cone, at a random roll; the
-    posture is drawn from the library.
+    posture is drawn from the library, not from the map's cylinders: one finger reaches everywhere.
     """
+    hand, postures, cone = reach_map.hand, reach_map.postures, reach_map.cone
     fingers = rng.integers(len(hand.fingers), size=(count, 1)).astype(np.intp)
     chosen = rng.choice(len(postures), size=count, replace=count > len(postures))
     rows = np.arange(count)
@@ -227,7 +222,7 @@ def single_candidates(
         gap=np.zeros((count, 1)),
         pad_angle=np.arccos(np.clip(-np.sum(inward * place.n, axis=1), -1.0, 1.0))[:, None],
     )
-    return _kept(hand, fingers, spheres, surface, laid, cone, workspace or Workspace())
+    return _kept(hand, fingers, reach_map.spheres, surface, laid, cone, workspace or Workspace())
 
 
 def _in_disc(count: int, rng: np.random.Generator) -> Array:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 import pinocchio as pin
@@ -12,10 +11,7 @@ from estimator.belief import Belief, sample_objects
 from estimator.profile import Profile
 from estimator.surface import SurfaceOfRevolution
 from estimator.vectors import Array, frozen
-from hand_models.collision import HandCollision
 from hand_models.hand import Hand
-from hand_models.postures import Postures, posture_library
-from hand_models.spheres import LinkSpheres, link_spheres
 from planner.candidates import Candidates, placement_candidates
 from planner.closing import Bodies, bodies_of, body_of
 from planner.funnel import Funnel
@@ -29,8 +25,9 @@ from planner.grasp_motion import (
 )
 from planner.grasp_options import GraspOptions
 from planner.grasp_outcome import Grasp, Hold, NoGrasp, closes_on, hold_on
+from planner.hand_tools import HandTools, hand_tools
 from planner.motion import Approach, plan_approaches
-from planner.reach import Reach, ReachSolver, Unreachable
+from planner.reach import Reach, Unreachable
 from planner.reach_task import ReachOptions
 from planner.solid import RevolvedSolid
 from planner.starts import Start
@@ -59,7 +56,7 @@ def plan_grasp(
         ValueError: Heights beside the object, or more fingers than the hand has.
     """
     options = options or GraspOptions()
-    tools = _tools(hand, options.reach)
+    tools = hand_tools(hand, options.reach)
     bodies = bodies_of(sample_objects(belief, options.objects, rng=rng))
     ranked, funnel = _ranked(tools, belief.surface, bodies, options, rng)
     solid = _solid(belief.surface)
@@ -72,25 +69,6 @@ def plan_grasp(
             return _grasp(tools, made, fresh, belief.surface, options.friction, funnel)
         failures[made] = failures.get(made, 0) + 1
     raise NoGrasp(funnel + tuple((f"out of reach: {r}", n) for r, n in failures.items()))
-
-
-@dataclass(frozen=True, eq=False)
-class _Tools:
-    """What is built once per hand and rules."""
-
-    hand: Hand
-    postures: Postures
-    spheres: LinkSpheres
-    solver: ReachSolver
-    collision: HandCollision
-
-
-@lru_cache(maxsize=8)
-def _tools(hand: Hand, options: ReachOptions) -> _Tools:
-    return _Tools(
-        hand, posture_library(hand), link_spheres(hand), ReachSolver(hand, options),
-        HandCollision(hand),
-    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +103,7 @@ class _Between:
 
 
 def _ranked(
-    tools: _Tools,
+    tools: HandTools,
     surface: SurfaceOfRevolution,
     bodies: Bodies,
     options: GraspOptions,
@@ -142,7 +120,7 @@ def _ranked(
 
 
 def _with_fingers(
-    tools: _Tools,
+    tools: HandTools,
     surface: SurfaceOfRevolution,
     bodies: Bodies,
     options: GraspOptions,
@@ -152,11 +130,8 @@ def _with_fingers(
     if count > len(tools.hand.fingers):
         raise ValueError(f"fingers: {tools.hand.name} has {len(tools.hand.fingers)}, not {count}")
     laid = placement_candidates(
-        tools.hand,
-        tools.postures,
-        tools.spheres,
+        tools.reach_map,
         _bounded(surface, options.heights),
-        cone=options.reach.cone,
         workspace=options.reach.workspace,
         count=options.placements,
         rng=rng,
@@ -218,7 +193,9 @@ def _solid(surface: SurfaceOfRevolution) -> RevolvedSolid:
     return RevolvedSolid(X_WO, z, surface.profile.derivatives(z)[0])
 
 
-def _made(tools: _Tools, solid: RevolvedSolid, one: _Ranked, options: GraspOptions) -> _Made | str:
+def _made(
+    tools: HandTools, solid: RevolvedSolid, one: _Ranked, options: GraspOptions
+) -> _Made | str:
     """The candidate made exact, or the reason why it cannot be."""
     reach = tools.solver.solve(
         one.closing.points[0],
@@ -242,7 +219,7 @@ def _made(tools: _Tools, solid: RevolvedSolid, one: _Ranked, options: GraspOptio
 
 
 def _grasp(
-    tools: _Tools,
+    tools: HandTools,
     made: _Made,
     fresh: Bodies,
     surface: SurfaceOfRevolution,

@@ -48,7 +48,7 @@ class Laid:
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """Where N hands are: joints, base rotation and position."""
+    """Where N hands are: joints, base rotation and position in the object frame O."""
 
     q: Array
     R: Array
@@ -58,21 +58,23 @@ class Poses:
 def lay(
     hand: Hand,
     surface: SurfaceOfRevolution,
-    q: Array,
+    poses: Poses,
     fingers: Index,
     *,
     cone: float,
-    rng: np.random.Generator,
+    iterations: int = ITERATIONS,
 ) -> Laid:
-    """Postures (N, nq) laid on with the given fingers (N, m), pads within `cone` [rad].
+    """Postures laid on with the given fingers (N, m), pads within `cone` [rad].
 
     Whether a posture that came to rest is good enough is the caller's to say: `gap` and
     `pad_angle` tell.
+
+    Args:
+        poses: Where they start: `opening_poses`, or placements on something alike.
+        iterations: Of Gauss-Newton.
     """
     radius = np.array([f.pad_radius for f in hand.fingers])[fingers]
-    start = _start(surface, batch_pads(hand, q), fingers, radius, rng)
-    poses = Poses(q, *start)
-    for _ in range(ITERATIONS):
+    for _ in range(iterations):
         pads = batch_pads(hand, poses.q)
         at = touching(surface, poses, pads, fingers, radius)
         poses = _moved(hand, poses, _step(at, surface.profile.z_range, 0.8 * cone), at)
@@ -147,7 +149,7 @@ def _step(at: Touching, z_range: tuple[float, float], cone: float) -> Array:
         _skew(at.n) @ -_skew(at.pad) @ turn - _skew(at.pad) @ normal_move
     )
     jacobian[..., 1:4, :] /= ANGLE_UNIT
-    beyond = at.z - np.clip(at.z, *_inset(z_range))
+    beyond = at.z - np.clip(at.z, *inset(z_range))
     residual[..., 4] = beyond / HEIGHT_UNIT
     jacobian[..., 4, :] = (beyond != 0.0)[..., None] * move[..., 2, :] / HEIGHT_UNIT
     willing = np.concatenate([np.full(nq, JOINT_UNIT), BASE_UNIT])
@@ -168,16 +170,16 @@ def _moved(hand: Hand, poses: Poses, step: Array, at: Touching) -> Poses:
     return Poses(q, turn @ poses.R, p)
 
 
-def _start(
-    surface: SurfaceOfRevolution,
-    pads: BatchPads,
-    fingers: Index,
-    radius: Array,
-    rng: np.random.Generator,
-) -> tuple[Array, Array]:
-    """The axis across all pad normals, at about the right distance; sense and height random."""
-    count = len(fingers)
+def opening_poses(
+    hand: Hand, surface: SurfaceOfRevolution, q: Array, fingers: Index, *, rng: np.random.Generator
+) -> Poses:
+    """Postures (N, nq) with the axis across all pad normals, at about the right distance.
+
+    Sense and height are random.
+    """
+    count, pads = len(fingers), batch_pads(hand, q)
     rows = np.arange(count)[:, None]
+    radius = np.array([f.pad_radius for f in hand.fingers])[fingers]
     centres, normals = pads.centres[rows, fingers], pads.normals[rows, fingers]
     r, _, _ = surface.profile.derivatives(np.full(1, np.mean(surface.profile.z_range)))
     across = np.einsum("nmi,nmj->nij", normals, normals)
@@ -188,12 +190,13 @@ def _start(
     middle = np.mean(centres + (radius + r[0])[..., None] * normals, axis=1)
     e = basis_across(u)
     R_OB = np.stack([e[:, 0], e[:, 1], u], axis=1)
-    low, high = _inset(surface.profile.z_range)
+    low, high = inset(surface.profile.z_range)
     height = np.stack([np.zeros(count), np.zeros(count), rng.uniform(low, high, count)], axis=1)
-    return R_OB, height - np.einsum("nij,nj->ni", R_OB, middle)
+    return Poses(q, R_OB, height - np.einsum("nij,nj->ni", R_OB, middle))
 
 
-def _inset(z_range: tuple[float, float]) -> tuple[float, float]:
+def inset(z_range: tuple[float, float]) -> tuple[float, float]:
+    """Heights a tenth within both ends."""
     low, high = z_range
     return low + 0.1 * (high - low), high - 0.1 * (high - low)
 

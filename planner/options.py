@@ -23,7 +23,7 @@ class PlannerOptions:
         reach: Rules of reachability: pad cone, clearances, the arm's workspace, stroke.
         fingers_at_once: Contacts of one placement of the hand; fewer where so many do not reach.
         margin: Smallest margin from every singularity, kept by nine in ten sampled objects [-].
-        placements: How many postures are laid onto the believed surface.
+        placements: How many placements of the hand are fitted to the believed surface.
         objects: How many objects are drawn from the belief.
         tries: How many of the best placements are handed to the optimiser.
         offset_guard: Common rotation of the directions that a plan is proof against, whether the
@@ -40,7 +40,7 @@ class PlannerOptions:
     reach: ReachOptions = field(default_factory=lambda: ReachOptions(starts=0, rescues=1))
     fingers_at_once: int = 3
     margin: float = MARGIN
-    placements: int = 1200
+    placements: int = 480
     objects: int = 20
     tries: int = 24
     offset_guard: float = OFFSET_GUARD

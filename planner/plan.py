@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -15,20 +15,17 @@ from estimator.bounds import AxisBound
 from estimator.contact import SensorNoise
 from estimator.surface import Place, SurfaceOfRevolution
 from estimator.vectors import Index, frozen
-from hand_models.collision import HandCollision
 from hand_models.hand import Hand
-from hand_models.postures import Postures, posture_library
-from hand_models.spheres import LinkSpheres, link_spheres
 from planner.candidates import Candidates, placement_candidates, single_candidates
 from planner.choice import Ranking, rank
 from planner.funnel import Funnel
 from planner.goal import Goal
+from planner.hand_tools import HandTools, hand_tools
 from planner.motion import Approach, approach_by_base, plan_approaches
 from planner.optimum import certificate, value_at
 from planner.options import PlannerOptions
 from planner.plan_types import NoPlan, Plan, Probe
-from planner.reach import Reach, ReachSolver, Unreachable
-from planner.reach_task import ReachOptions
+from planner.reach import Reach, Unreachable
 from planner.retreat import Retreat, plan_retreat
 from planner.risk import risks
 from planner.solid import RevolvedSolid
@@ -44,31 +41,12 @@ SOLID_HEIGHTS = 101
 RISK_OBJECTS = 40
 
 
-@dataclass(frozen=True, eq=False)
-class _Tools:
-    """What is built once per hand and options."""
-
-    hand: Hand
-    postures: Postures
-    spheres: LinkSpheres
-    collision: HandCollision
-    solver: ReachSolver
-
-
 class _Made(NamedTuple):
     """A placement made exact: certified, with the ways to the contacts and out."""
 
     reach: Reach
     approaches: tuple[Approach, ...]
     retreat: Retreat
-
-
-@lru_cache(maxsize=8)
-def _tools(hand: Hand, options: ReachOptions) -> _Tools:
-    return _Tools(
-        hand, posture_library(hand), link_spheres(hand), HandCollision(hand),
-        ReachSolver(hand, options),
-    )  # fmt: skip
 
 
 def plan_probes(
@@ -116,7 +94,7 @@ def plan_preferred(
     Raises:
         NoPlan: No placement with any of them.
     """
-    tools = _tools(hand, options.reach)
+    tools = hand_tools(hand, options.reach)
     funnel: Funnel = ()
     for count in counts:
         found = _best_placement(tools, belief, sensor, goal, options, count, rng, prefer)
@@ -127,7 +105,7 @@ def plan_preferred(
 
 
 def _best_placement(
-    tools: _Tools,
+    tools: HandTools,
     belief: Belief,
     sensor: SensorNoise,
     goal: Goal,
@@ -194,23 +172,15 @@ def _judged(
 
 
 def _candidates(
-    tools: _Tools,
+    tools: HandTools,
     surface: SurfaceOfRevolution,
     options: PlannerOptions,
     count: int,
     rng: np.random.Generator,
 ) -> Candidates:
     make = single_candidates if count == 1 else partial(placement_candidates, fingers_at_once=count)
-    return make(
-        tools.hand,
-        tools.postures,
-        tools.spheres,
-        surface,
-        cone=options.reach.cone,
-        workspace=options.reach.workspace,
-        count=options.placements,
-        rng=rng,
-    )
+    workspace, several = options.reach.workspace, options.placements
+    return make(tools.reach_map, surface, workspace=workspace, count=several, rng=rng)
 
 
 def _solid(surface: SurfaceOfRevolution) -> RevolvedSolid:
@@ -221,7 +191,7 @@ def _solid(surface: SurfaceOfRevolution) -> RevolvedSolid:
 
 
 def _made(
-    tools: _Tools,
+    tools: HandTools,
     belief: Belief,
     options: PlannerOptions,
     solid: RevolvedSolid,

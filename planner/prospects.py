@@ -10,14 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.axis import Axis
 from estimator.belief import SampledObjects
-from estimator.profile import SplineProfile
 from estimator.singular import PlacedTriples
-from estimator.surface import Geometry, SurfaceOfRevolution
+from estimator.surface import Geometry
 from estimator.vectors import Array, Mask
+from planner.sampled_surfaces import SampledSurfaces
 
 BEFORE, BEHIND = 0.030, 0.025  # how far an approach goes, about the expected contact [m]
+STEPS = 6
 RIM = 0.02  # of the height at each end where a touch does not count as one of the wall
 
 
@@ -52,42 +52,40 @@ def prospects(samples: SampledObjects, p_W: Array, n_W: Array) -> Prospects:
     Args:
         p_W, n_W: Expected contacts and outward normals, (N, m, 3) [m], unit.
     """
-    shape = p_W.shape[:2]
-    p, n = p_W.reshape(-1, 3), n_W.reshape(-1, 3)
-    rows = [_on_object(samples, b, p, n) for b in range(len(samples.points))]
-    geometry = Geometry(*(np.stack(x) for x in zip(*(row[0] for row in rows), strict=True)))
-    theta, z, r, dr, ddr, hit = (
-        np.stack(x).reshape(-1, *shape) for x in zip(*(row[1] for row in rows), strict=True)
-    )
-    return Prospects(
-        geometry, theta, z, r, dr, ddr, hit.astype(bool), samples.points, samples.directions
-    )
-
-
-def _on_object(
-    samples: SampledObjects, b: int, p: Array, n: Array
-) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
-    profile = SplineProfile(samples.z, samples.radii[b])
-    surface = SurfaceOfRevolution(Axis(samples.points[b], samples.directions[b]), profile)
-    low, high = profile.z_range
-    s = np.zeros(len(p))
-    for _ in range(6):
-        theta, rho, z = surface.cylindrical(p - s[:, None] * n)
-        r, dr, _ = profile.derivatives(np.clip(z, low, high))
-        rad = np.column_stack([np.cos(theta), np.sin(theta)]) @ surface.frame[:2]
-        slope = -np.sum(n * rad, axis=1) + dr * (n @ surface.axis.direction)
-        s = np.clip(s - (rho - r) / np.minimum(slope, -0.2), -1.5 * BEFORE, 1.5 * BEHIND)
-    theta, rho, z = surface.cylindrical(p - s[:, None] * n)
+    B, (N, m) = len(samples.points), p_W.shape[:2]
+    p = np.broadcast_to(p_W.reshape(1, -1, 3), (B, N * m, 3))
+    n = np.broadcast_to(n_W.reshape(1, -1, 3), (B, N * m, 3))
+    surfaces = SampledSurfaces(samples)
+    s, theta, off_wall, z = _met(surfaces, p, n)
+    low, high = surfaces.profiles.z_range
     inset = RIM * (high - low)
     inside = np.clip(z, low, high)
-    r, dr, ddr = profile.derivatives(inside)
-    hit = (np.abs(rho - r) < 5e-4) & (s > -BEFORE) & (s < BEHIND)
+    hit = (np.abs(off_wall) < 5e-4) & (s > -BEFORE) & (s < BEHIND)
     hit &= (z > low + inset) & (z < high - inset)
-    g = surface.at(theta, inside)
-    return (
-        (g.p, g.n, g.k_theta, g.k_z, g.kappa_theta, g.kappa_z),
-        (theta, inside, r, dr, ddr, hit.astype(np.float64)),
-    )
+    places = (theta, inside, *surfaces.profiles.derivatives(inside))
+    theta, inside, r, dr, ddr = (x.reshape(B, N, m) for x in places)
+    return Prospects(
+        surfaces.at(*places[:2]), theta, inside, r, dr, ddr, hit.reshape(B, N, m),
+        samples.points, samples.directions,
+    )  # fmt: skip
+
+
+def _met(surfaces: SampledSurfaces, p: Array, n: Array) -> tuple[Array, Array, Array, Array]:
+    """Where lines p - s n (B, M) meet the walls: s, meridian angle, what is left, height.
+
+    Newton's steps along the line; on a wall that leans away they are kept short.
+    """
+    low, high = surfaces.profiles.z_range
+    across = n @ np.swapaxes(surfaces.frames, 1, 2)
+    s = np.zeros(p.shape[:2])
+    for _ in range(STEPS):
+        theta, rho, z = surfaces.cylindrical(p - s[..., None] * n)
+        r, dr, _ = surfaces.profiles.derivatives(np.clip(z, low, high))
+        outward = across[..., 0] * np.cos(theta) + across[..., 1] * np.sin(theta)
+        slope = -outward + dr * across[..., 2]
+        s = np.clip(s - (rho - r) / np.minimum(slope, -0.2), -1.5 * BEFORE, 1.5 * BEHIND)
+    theta, rho, z = surfaces.cylindrical(p - s[..., None] * n)
+    return s, theta, rho - surfaces.profiles.derivatives(np.clip(z, low, high))[0], z
 
 
 def with_earlier(landed: Prospects, samples: SampledObjects, p_W: Array) -> PlacedTriples | None:
@@ -98,23 +96,22 @@ def with_earlier(landed: Prospects, samples: SampledObjects, p_W: Array) -> Plac
     Returns:
         None unless k earlier contacts and the m new ones are three.
     """
-    B, N, m = landed.theta.shape
+    _, N, m = landed.theta.shape
     k = len(p_W)
     if k + m != 3:
         return None
     if k == 0:
         return landed.triples
-    earlier = [_known_places(samples, b, p_W) for b in range(B)]
-    columns = []
-    for name, new in zip(PlacedTriples._fields, landed.triples, strict=True):
-        known = np.array([getattr(places, name) for places in earlier])  # (B, k)
-        columns.append(np.concatenate([np.repeat(known[:, None], N, axis=1), new], axis=-1))
+    known = _known_places(SampledSurfaces(samples), p_W)
+    columns = [
+        np.concatenate([np.repeat(old[:, None], N, axis=1), new], axis=-1)
+        for old, new in zip(known, landed.triples, strict=True)
+    ]
     return PlacedTriples(*columns)
 
 
-def _known_places(samples: SampledObjects, b: int, p_W: Array) -> PlacedTriples:
-    profile = SplineProfile(samples.z, samples.radii[b])
-    surface = SurfaceOfRevolution(Axis(samples.points[b], samples.directions[b]), profile)
-    theta, _, z = surface.cylindrical(p_W)
-    z = np.clip(z, *profile.z_range)
-    return PlacedTriples(theta, z, *profile.derivatives(z))
+def _known_places(surfaces: SampledSurfaces, p_W: Array) -> PlacedTriples:
+    """Places of contacts (k, 3) on each object, (B, k)."""
+    theta, _, z = surfaces.cylindrical(p_W[None])
+    z = np.clip(z, *surfaces.profiles.z_range)
+    return PlacedTriples(theta, z, *surfaces.profiles.derivatives(z))

@@ -1,7 +1,8 @@
 """Put the hand's pads on given contacts: joint angles and a base pose, certified, or a reason.
 
 Starts (the caller's, then the library's) go through a fast SQP one by one; the first whose solution
-passes the independent check is returned. If none does, the most promising go through Ipopt.
+passes the independent check is returned. If none does, the most promising of those that stopped
+short go through Ipopt.
 """
 
 from __future__ import annotations
@@ -85,8 +86,7 @@ class ReachSolver:
                 return outcome
             failed.append(outcome)
             used.append(start)
-        nearest = sorted(range(len(failed)), key=lambda i: failed[i].violation)
-        for i in nearest[: self.options.rescues]:
+        for i in _to_rescue(failed)[: self.options.rescues]:
             outcome = self._attempt(task, used[i], "ipopt", motion, len(failed) + 1)
             if isinstance(outcome, Reach):
                 return outcome
@@ -176,6 +176,16 @@ class ReachSolver:
 
     def _radii(self, fingers: tuple[int, ...]) -> Array:
         return np.array([self.hand.fingers[i].pad_radius for i in fingers])
+
+
+def _to_rescue(failed: list[Solution]) -> list[int]:
+    """Those that stopped short, the nearest first.
+
+    What solved the problem and failed the inspection, as links collide with each other, would
+    fail it again: the problem does not know of that.
+    """
+    short = [i for i, solution in enumerate(failed) if not solution.violation < _HOPELESS]
+    return sorted(short, key=lambda i: failed[i].violation)
 
 
 def _contacts(points: ArrayLike, normals: ArrayLike, *, most: int) -> tuple[Array, Array]:

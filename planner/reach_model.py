@@ -50,7 +50,7 @@ _SQP_OPTIONS = {
     "qpsol_options": {"error_on_fail": False},
     "hessian_approximation": "limited-memory",
     "max_iter": 50,
-    "tol_pr": 1e-7,
+    "tol_pr": 1e-5,  # 0.5 um
     "tol_du": 1.0,
     "error_on_fail": False,
     "print_time": False,

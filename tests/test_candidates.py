@@ -10,24 +10,24 @@ from estimator.surface import SurfaceOfRevolution
 from hand_models import load_hand
 from hand_models.batch_pads import batch_pads
 from hand_models.postures import posture_library
-from hand_models.spheres import link_spheres
 from planner.candidates import GAP, placement_candidates, single_candidates
+from planner.hand_tools import hand_tools
+from planner.reach_task import ReachOptions
 from planner.workspace import Workspace
 
 AXIS = Axis(np.array([0.5, 0.1, 0.2]), np.array([0.1, -0.2, 0.9]))
 CONE = np.deg2rad(40.0)
 HAND = load_hand("allegro_right")
 POSTURES = posture_library(HAND)
-SPHERES = link_spheres(HAND)
+TOOLS = hand_tools(HAND, ReachOptions(cone=CONE))
 
 
 def found(profile, count=400, seed=0, single=False, **options):
     surface = SurfaceOfRevolution(AXIS, profile)
     make = single_candidates if single else placement_candidates
     candidates = make(
-        HAND, POSTURES, SPHERES, surface,
-        cone=CONE, count=count, rng=np.random.default_rng(seed), **options,
-    )  # fmt: skip
+        TOOLS.reach_map, surface, count=count, rng=np.random.default_rng(seed), **options
+    )
     return surface, candidates
 
 

@@ -233,7 +233,7 @@ def test_an_object_out_of_reach_is_explained():
     with pytest.raises(NoGrasp, match="base outside its workspace") as caught:
         planned_anew("can", options=options)
     assert "More friction" in str(caught.value)
-    assert dict(caught.value.funnel)["3 fingers: placements laid"] == 100
+    assert dict(caught.value.funnel)["3 fingers: placements fitted"] == 100
 
 
 def test_without_friction_nothing_of_revolution_is_held():

@@ -14,6 +14,8 @@ from hand_models.spheres import link_spheres
 from planner.candidates import GAP, placement_candidates
 from planner.choice import rank
 from planner.goal import Goal
+from planner.hand_tools import hand_tools
+from planner.reach_task import ReachOptions
 from planner.sweep import FROM, KEPT, joined, swept
 from planner.worth import Worth
 
@@ -30,9 +32,8 @@ def scene():
     rng = np.random.default_rng(0)
     worth = Worth(belief, sample_objects(belief, 6, rng=rng), SENSORS["gel"], GOAL)
     laid = placement_candidates(
-        hand, posture_library(hand), link_spheres(hand), belief.surface,
-        cone=CONE, count=300, rng=rng,
-    )  # fmt: skip
+        hand_tools(hand, ReachOptions(cone=CONE)).reach_map, belief.surface, count=300, rng=rng
+    )
     ranking = rank(laid, belief, worth.samples, worth.noise, GOAL)
     more, scored = swept(
         hand, posture_library(hand), link_spheres(hand), laid, ranking.order[:FROM], worth,
