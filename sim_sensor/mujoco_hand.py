@@ -19,31 +19,35 @@ BASE = "base"
 ARMATURE = 2e-3  # of the gears [kg m^2] or [kg]
 STIFFNESS = {True: 20.0, False: 2e4}  # of actuators: turning [Nm/rad], sliding [N/m]
 DAMPING = {True: 1.0, False: 300.0}
-PAD_SOLREF, PAD_SOLIMP = (-150.0, -30.0), (0.5, 0.5, 1e-3, 0.5, 2.0)  # 0.5 N press about 1 mm
+PAD_STIFFNESS, PAD_SOLIMP = 150.0, (0.5, 0.5, 1e-3, 0.5, 2.0)  # [1/s^2]: 0.5 N press about 1 mm
+FINGER_MASS = 0.18  # that a pad feels of its finger [kg]
 _LIGHTEST = 1e-3  # link [kg]
 _OWN_PAD = 1.08  # points of a tip's mesh within so many pad radii are the pad's own
 _FLAT = 1e-3  # least extent of a hull, as a singular value [m]
 _TOUCHABLE, _TOUCHES = 0, 1  # contype and conaffinity: a hand meets objects, not itself
 
 
-def add_hand(spec: mujoco.MjSpec, hand: Hand, *, links: bool) -> None:
+def add_hand(spec: mujoco.MjSpec, hand: Hand, *, links: bool, object_mass: float = np.inf) -> None:
     """The hand as bodies of a spec: joints, actuators and pads under its own names.
 
     Args:
         links: With the links' hulls; without, only pads collide.
+        object_mass: Of what is touched [kg]. MuJoCo's soft contacts give an acceleration, not a
+            force, so that a gel of one stiffness is stated for the two masses that meet.
     """
+    stiffness = PAD_STIFFNESS * (1.0 + FINGER_MASS / object_mass)
     base = spec.worldbody.add_body(name=BASE, mocap=True)
     bodies = [base]
     for j in range(1, hand.model.njoints):
         parent = bodies[hand.model.parents[j]]
         bodies.append(_add_joint(spec, parent, hand.model, j))
-    for row, finger in enumerate(hand.fingers):
+    for finger in hand.fingers:
         joint, centre, _ = pad_in_joint(hand, finger)
         bodies[joint].add_geom(
-            name=pad_name(hand.fingers[row].name), type=mujoco.mjtGeom.mjGEOM_SPHERE, pos=centre,
-            size=[finger.pad_radius, 0.0, 0.0], mass=_LIGHTEST, contype=_TOUCHABLE,
-            conaffinity=_TOUCHES, solref=PAD_SOLREF, solimp=PAD_SOLIMP, priority=1, condim=4,
-            friction=[1.0, 5e-3, 1e-4],
+            name=pad_name(finger.name), type=mujoco.mjtGeom.mjGEOM_SPHERE, pos=centre,
+            size=[finger.pad_radius, 0.0, 0.0], mass=_LIGHTEST, priority=1, condim=4,
+            contype=_TOUCHABLE, conaffinity=_TOUCHES, friction=[1.0, 5e-3, 1e-4],
+            solref=[-stiffness, -2.5 * np.sqrt(stiffness)], solimp=PAD_SOLIMP,
         )  # fmt: skip
     if links:
         _add_links(spec, hand, bodies)

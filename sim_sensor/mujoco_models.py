@@ -15,10 +15,12 @@ import numpy as np
 from estimator.surface import SurfaceOfRevolution
 from hand_models.hand import Hand
 from sim_sensor.mujoco_hand import add_hand, pad_name
-from sim_sensor.mujoco_object import OBJECT, add_felt_mesh, add_object, add_slices
+from sim_sensor.mujoco_object import CARRIES, OBJECT, add_felt_mesh, add_object, add_slices
 from sim_sensor.mujoco_skin import add_skin, settle_skins
 
-__all__ = ["OBJECT", "TIMESTEP", "Models", "Standing", "build_models"]
+__all__ = [
+    "OBJECT", "TIMESTEP", "Models", "Standing", "build_models", "feeling_model", "moving_model",
+]  # fmt: skip
 
 TIMESTEP = 2e-3  # [s]
 _HELD_MASS = 1.0  # of an object that cannot move; any [kg]
@@ -55,15 +57,18 @@ def build_models(
     Raises:
         ValueError: An object that is to stand on its end, and leans.
     """
+    return Models(moving_model(hand, surface, standing), feeling_model(hand, surface, standing))
+
+
+def moving_model(
+    hand: Hand, surface: SurfaceOfRevolution, standing: Standing | None = None
+) -> mujoco.MjModel:
+    """What moves and collides; arguments as of `build_models`."""
     if standing is not None and surface.axis.direction[2] < 1.0 - 1e-9:
         raise ValueError("standing: an object stands on a table with its axis along +z")
-    return Models(_moving(hand, surface, standing), _feeling(hand, surface, standing))
-
-
-def _moving(hand: Hand, surface: SurfaceOfRevolution, standing: Standing | None) -> mujoco.MjModel:
     spec = _spec()
-    add_hand(spec, hand, links=True)
     how = standing or Standing(_HELD_MASS)
+    add_hand(spec, hand, links=True, object_mass=np.inf if standing is None else how.mass)
     body = add_object(spec, surface, movable=standing is not None)
     add_slices(spec, body, surface.profile, mass=how.mass, friction=how.friction)
     if standing is not None:
@@ -71,7 +76,10 @@ def _moving(hand: Hand, surface: SurfaceOfRevolution, standing: Standing | None)
     return spec.compile()
 
 
-def _feeling(hand: Hand, surface: SurfaceOfRevolution, standing: Standing | None) -> mujoco.MjModel:
+def feeling_model(
+    hand: Hand, surface: SurfaceOfRevolution, standing: Standing | None = None
+) -> mujoco.MjModel:
+    """What is felt, some seconds for its octree; arguments as of `build_models`."""
     spec = _spec()
     add_hand(spec, hand, links=False)
     for finger in hand.fingers:
@@ -92,9 +100,10 @@ def _spec() -> mujoco.MjSpec:
 
 
 def _add_table(spec: mujoco.MjSpec, surface: SurfaceOfRevolution, standing: Standing) -> None:
-    """A plane under the object's lower end."""
+    """A plane under the object's lower end; it carries the object and lets the hand pass."""
     height = float(surface.axis.point[2] + surface.profile.z_range[0])
     spec.worldbody.add_geom(
         name="table", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1.0, 1.0, 0.1],
         pos=np.array([0.0, 0.0, height]), friction=[standing.friction, 5e-3, 1e-4], condim=4,
+        contype=CARRIES, conaffinity=0,
     )  # fmt: skip

@@ -17,6 +17,7 @@ from estimator.vectors import Array
 from sim_sensor.scanned import wall_radius
 
 OBJECT = "object"
+CARRIES = 2  # bit of what carries the object without meeting the hand
 _SLICES, _SIDES = 28, 64
 _RINGS, _SEGMENTS, _OCTREE = 81, 192, 7  # sagitta of a facet: 10 um at a radius of 80 mm
 
@@ -45,6 +46,7 @@ def add_slices(
         body.add_geom(
             name=f"{OBJECT}/{k}", type=mujoco.mjtGeom.mjGEOM_MESH, meshname=f"{OBJECT}/{k}",
             mass=mass / _SLICES, friction=[friction, 5e-3, 1e-4], condim=4,
+            contype=1, conaffinity=1 | CARRIES,
         )  # fmt: skip
 
 

@@ -52,6 +52,7 @@ class Press:
         tip: Its centre [m], (3,).
         stop: Where on the path, counted in its points with fractions.
         qpos: MuJoCo's configuration there.
+        X_WB: The hand's base there.
         met: Where on the object the pad first met it; None if it never did.
         rests: Where on the object it rests at last; None if it does not.
         force: On the pad [N].
@@ -63,6 +64,7 @@ class Press:
     tip: Array
     stop: float
     qpos: Array
+    X_WB: pin.SE3
     met: Array | None
     rests: Array | None
     force: float
@@ -104,8 +106,8 @@ def press(model: mujoco.MjModel, data: mujoco.MjData, hand: Hand, way: Touching)
     felt = _touched(model, data, pad)
     tip = frozen(data.geom(pad).xpos)
     told = Press(
-        tip, _stop(way, route[at].place, tip), frozen(data.qpos), met, felt.met, felt.force,
-        reached, tuple(sorted(bumped)), float(np.linalg.norm(lead)),
+        tip, _stop(way, route[at].place, tip), frozen(data.qpos), route[at].X_WB,
+        met, felt.met, felt.force, reached, tuple(sorted(bumped)), float(np.linalg.norm(lead)),
     )  # fmt: skip
     for tick in route[at :: -round(BACK / SPEED)]:
         _step(model, data, tick, pad)

@@ -26,13 +26,13 @@ from estimator.surface import Geometry, SurfaceOfRevolution
 from estimator.vectors import Array, frozen
 from hand_models.hand import Hand
 from sim_sensor.gel import GelPad, GelSession
-from sim_sensor.mujoco_hand import pad_name
+from sim_sensor.mujoco_hand import pad_name, place_base
 from sim_sensor.mujoco_models import OBJECT, Standing, build_models
 from sim_sensor.mujoco_press import Press, Touching, press
 from sim_sensor.mujoco_skin import PITCH, PIXELS, feel
 from sim_sensor.raw_sense import read_signal
 from sim_sensor.scanned import Scan, felt_at
-from sim_sensor.solid import Part, Solid
+from sim_sensor.solid import Solid
 from sim_sensor.world import TouchRecord
 
 SENSOR = "gel-depth"
@@ -99,9 +99,7 @@ class MujocoWorld:
     @property
     def surface(self) -> SurfaceOfRevolution:
         """The true object where it is now."""
-        body = self._data.body(OBJECT)
-        axis = Axis(frozen(body.xpos), frozen(body.xmat.reshape(3, 3)[:, 2]))
-        return replace(self._surface, axis=axis)
+        return self._surface_in(self._data)
 
     def touch(self, path: Touching, *, finger_axis_W: Array | None = None) -> Contact | Miss:
         """Carry the approach out and feel.
@@ -125,21 +123,27 @@ class MujocoWorld:
         )  # fmt: skip
         if pressed.rests is None:
             return told
-        surface = self.surface
-        told = replace(told, truth=_geometry(surface, pressed.rests), part=self._part(pressed.tip))
-        return self._feel(told, path.finger, pressed, np.zeros(3) if axis is None else axis)
+        data = self._felt
+        data.qpos[:] = pressed.qpos
+        place_base(data, pressed.X_WB)
+        mujoco.mj_forward(self._models.feeling, data)
+        surface = self._surface_in(data)
+        theta, rho, z = surface.cylindrical(pressed.tip)
+        told = replace(
+            told,
+            truth=_geometry(surface, pressed.rests),
+            part=self._solid.nearest(float(rho), float(z), float(theta)).part,
+        )
+        return self._feel(told, path.finger, np.zeros(3) if axis is None else axis)
 
-    def _part(self, tip: Array) -> Part:
-        """Which part of the bare solid a pad at `tip` rests on."""
-        theta, rho, z = self.surface.cylindrical(tip)
-        return self._solid.nearest(float(rho), float(z), float(theta)).part
+    def _surface_in(self, data: mujoco.MjData) -> SurfaceOfRevolution:
+        body = data.body(OBJECT)
+        axis = Axis(frozen(body.xpos), frozen(body.xmat.reshape(3, 3)[:, 2]))
+        return replace(self._surface, axis=axis)
 
-    def _feel(self, told: MujocoRecord, finger: str, pressed: Press, axis: Array) -> MujocoRecord:
-        """With what the pad felt where it stopped."""
+    def _feel(self, told: MujocoRecord, finger: str, axis: Array) -> MujocoRecord:
+        """With what the pad feels in the posed feeling model."""
         model, data, (sensor, session) = self._models.feeling, self._felt, self._pads[finger]
-        data.qpos[:], data.mocap_pos[:], data.mocap_quat[:] = (
-            pressed.qpos, self._data.mocap_pos, self._data.mocap_quat,
-        )  # fmt: skip
         image = feel(model, data, pad_name(finger), axis)
         if image is None:
             return told
