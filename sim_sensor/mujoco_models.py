@@ -15,7 +15,15 @@ import numpy as np
 from estimator.surface import SurfaceOfRevolution
 from hand_models.hand import Hand
 from sim_sensor.mujoco_hand import add_hand, pad_name
-from sim_sensor.mujoco_object import CARRIES, OBJECT, add_felt_mesh, add_object, add_slices
+from sim_sensor.mujoco_object import (
+    CARRIES,
+    OBJECT,
+    TABLE,
+    add_felt_mesh,
+    add_object,
+    add_slices,
+    foot,
+)
 from sim_sensor.mujoco_skin import add_skin, settle_skins
 
 __all__ = [
@@ -101,9 +109,8 @@ def _spec() -> mujoco.MjSpec:
 
 def _add_table(spec: mujoco.MjSpec, surface: SurfaceOfRevolution, standing: Standing) -> None:
     """A plane under the object's lower end; it carries the object and lets the hand pass."""
-    height = float(surface.axis.point[2] + surface.profile.z_range[0])
     spec.worldbody.add_geom(
-        name="table", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1.0, 1.0, 0.1],
-        pos=np.array([0.0, 0.0, height]), friction=[standing.friction, 5e-3, 1e-4], condim=4,
+        name=TABLE, type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1.0, 1.0, 0.1],
+        pos=foot(surface), friction=[standing.friction, 5e-3, 1e-4], condim=4,
         contype=CARRIES, conaffinity=0,
     )  # fmt: skip

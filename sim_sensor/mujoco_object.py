@@ -16,7 +16,7 @@ from estimator.surface import SurfaceOfRevolution
 from estimator.vectors import Array
 from sim_sensor.scanned import wall_radius
 
-OBJECT = "object"
+OBJECT, TABLE = "object", "table"
 CARRIES = 2  # bit of what carries the object without meeting the hand
 _SLICES, _SIDES = 28, 64
 _RINGS, _SEGMENTS, _OCTREE = 81, 192, 7  # sagitta of a facet: 10 um at a radius of 80 mm
@@ -26,12 +26,26 @@ def add_object(
     spec: mujoco.MjSpec, surface: SurfaceOfRevolution, *, movable: bool
 ) -> mujoco.MjsBody:
     """The object's body at its pose, its frame O: the axis is its z."""
-    quat = np.empty(4)
-    mujoco.mju_mat2Quat(quat, np.ascontiguousarray(surface.frame.T).ravel())
-    body = spec.worldbody.add_body(name=OBJECT, pos=surface.axis.point, quat=quat)
+    body = spec.worldbody.add_body(name=OBJECT, pos=surface.axis.point, quat=_quat(surface))
     if movable:
         body.add_freejoint(name=OBJECT)
     return body
+
+
+def place_object(model: mujoco.MjModel, surface: SurfaceOfRevolution) -> None:
+    """The same object somewhere else: an octree is worth keeping. New data start from there."""
+    body = model.body(OBJECT)
+    body.pos[:], body.quat[:] = surface.axis.point, _quat(surface)
+    if body.jntnum[0]:
+        model.joint(OBJECT).qpos0[:] = np.concatenate([surface.axis.point, _quat(surface)])
+    table = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, TABLE)
+    if table >= 0:
+        model.geom_pos[table] = foot(surface)
+
+
+def foot(surface: SurfaceOfRevolution) -> Array:
+    """Where the axis meets the lower end, world [m]."""
+    return np.asarray(surface.axis.point + surface.profile.z_range[0] * surface.axis.direction)
 
 
 def add_slices(
@@ -59,6 +73,12 @@ def add_felt_mesh(spec: mujoco.MjSpec, body: mujoco.MjsBody, profile: Profile) -
     mesh.uservert, mesh.userface = np.vstack([wall, ends]).ravel(), _closed_faces().ravel()
     mesh.needsdf, mesh.octree_maxdepth = True, _OCTREE
     body.add_geom(name=OBJECT, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=OBJECT, mass=1.0)
+
+
+def _quat(surface: SurfaceOfRevolution) -> Array:
+    quat = np.empty(4)
+    mujoco.mju_mat2Quat(quat, np.ascontiguousarray(surface.frame.T).ravel())
+    return quat
 
 
 def _rings(profile: Profile, z: Array, sides: int) -> Array:

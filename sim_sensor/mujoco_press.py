@@ -13,7 +13,7 @@ import pinocchio as pin
 from estimator.vectors import Array, frozen, unit
 from hand_models.hand import Hand
 from sim_sensor.mujoco_hand import link_name, pad_name, place_base
-from sim_sensor.mujoco_object import OBJECT
+from sim_sensor.mujoco_object import OBJECT, TABLE
 
 SPEED, BACK = 0.03, 0.15  # of the pad on its way and back [m/s]
 SETTLE = 0.2  # of the force, before it feels [s]
@@ -179,7 +179,7 @@ def _touched(model: mujoco.MjModel, data: mujoco.MjData, pad: str) -> _Pad:
         contact = data.contact[k]
         names = [model.geom(g).name for g in contact.geom]
         part, other = names if names[0].startswith(OBJECT) else names[::-1]
-        if contact.dist > 0.0 or not part.startswith(OBJECT) or other == "table":
+        if contact.dist > 0.0 or not part.startswith(OBJECT) or other == TABLE:
             continue
         if other != pad:
             others.add(link_name(other))

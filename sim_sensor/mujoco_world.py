@@ -27,7 +27,8 @@ from estimator.vectors import Array, frozen
 from hand_models.hand import Hand
 from sim_sensor.gel import GelPad, GelSession
 from sim_sensor.mujoco_hand import pad_name, place_base
-from sim_sensor.mujoco_models import OBJECT, Standing, build_models
+from sim_sensor.mujoco_models import OBJECT, Models, Standing, build_models
+from sim_sensor.mujoco_object import place_object
 from sim_sensor.mujoco_press import Press, Touching, press
 from sim_sensor.mujoco_skin import PITCH, PIXELS, feel
 from sim_sensor.raw_sense import read_signal
@@ -64,6 +65,7 @@ class MujocoWorld:
         hand: That touches.
         surface: The object at its pose, its ends flat.
         standing: How it stands; held in place by default.
+        models: Made before for this hand, profile and standing; the object is placed anew.
         noisy: Whether images have the errors of `gel-depth`; without, they are MuJoCo's own.
         rng: For the sensor.
     """
@@ -75,10 +77,13 @@ class MujocoWorld:
         *,
         rng: np.random.Generator,
         standing: Standing | None = None,
+        models: Models | None = None,
         noisy: bool = True,
     ) -> None:
         self._hand, self._surface, self._rng = hand, surface, rng
-        self._models = build_models(hand, surface, standing)
+        self._models = models or build_models(hand, surface, standing)
+        for model in (self._models.moving, self._models.feeling):
+            place_object(model, surface)
         self._data = mujoco.MjData(self._models.moving)
         self._felt = mujoco.MjData(self._models.feeling)
         self._pads = {f.name: _mounted(f.pad_radius, noisy, rng) for f in hand.fingers}

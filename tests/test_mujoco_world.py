@@ -14,7 +14,7 @@ pytest.importorskip("mujoco", minversion="3.9")
 
 import mujoco
 from commands import refused, script
-from mujoco_study import exact_belief
+from mujoco_sessions import exact_belief
 
 from estimator.axis import Axis
 from estimator.contact import Contact, Miss
