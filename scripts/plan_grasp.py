@@ -33,7 +33,7 @@ from grasp_ending import Ending, ending, ending_record, grip_of, print_ending
 from grasp_report import episode_of, print_round, raw_touches
 from output_files import require_writable, write_whole
 from rich.console import Console
-from worlds import build_world, pose_in, sensor_in
+from worlds import build_world, pose_in, print_object, sensor_in
 
 from estimator.axis import angle_between, offset_at
 from estimator.belief import Belief
@@ -68,7 +68,7 @@ class Options:
     """Hand: allegro_right, allegro_left, or the path of a description (.toml)."""
     object: str = "can"
     """What is touched: a built-in name (can, bottle, cone, cup, barrel, jar-lid, knob, vase, egg,
-    spindle, paper-lathe, sphere), a CSV file with columns r_mm,z_mm or a product's JSON file."""
+    spindle, paper-lathe, sphere), a CSV file (r_mm,z_mm), a product's JSON or a mesh (stl, obj)."""
     sensor: str = "gel"
     """Tactile sensor. Readings with noise: ideal, fearing1988, robotworld, taxel, gel, gel-good,
     gel-poor. Raw signals, simulated and read: fearing-strain, gel-depth, taxel-array."""
@@ -125,6 +125,7 @@ def main() -> int:
     except (ValueError, HandError) as error:
         print(f"plan_grasp: {error}", file=sys.stderr)
         return 2
+    print_object(console, options.object)
     steps: list[Step] = []
     reason = ""
     try:

@@ -9,14 +9,17 @@ MuJoCo is installed with the extra `mujoco`; nothing here imports it unless it i
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from rich.console import Console
 
 from estimator.axis import Axis
 from estimator.readers.raw_sensors import RAW_SENSORS, RawSensor, raw_sensor
 from estimator.surface import SurfaceOfRevolution
 from hand_models.hand import Hand
+from sim_sensor.mesh_objects import SUFFIXES, read_mesh
 from sim_sensor.noise import simulated_sensor
 from sim_sensor.raw_sense import raw_sense
 from sim_sensor.world import World
@@ -68,6 +71,12 @@ def build_world(
         raise ValueError(f"--world {world}: needs the extra 'mujoco' ({error})") from None
     standing = Standing() if world == "mujoco-table" else None
     return MujocoWorld(hand, surface, rng=rng, standing=standing)
+
+
+def print_object(console: Console, name: str) -> None:
+    """How far a user's mesh is from what everything here believes in."""
+    if Path(name).suffix.lower() in SUFFIXES:
+        console.print(f"[bold]Object[/] {read_mesh(Path(name)).words}")
 
 
 def raw_sensor_of(world: World | MujocoWorld, sensor: str) -> RawSensor:
