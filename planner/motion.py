@@ -14,7 +14,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from hand_models.collision import HandCollision
-from hand_models.hand import Finger, Hand
+from hand_models.hand import Hand
+from planner.pull import pulled
 from planner.reach import Reach
 
 Array = NDArray[np.float64]
@@ -24,8 +25,6 @@ FORCE_GOAL = 0.5  # a soft pad feels that, and hardly any object moves [N]
 ARM_STROKE = 0.03  # before and behind the contact, where the arm moves [m]
 _OFF_LINE = 2e-4  # of the pad's centre, where an overshoot ends [m]
 _JUMP = 0.2  # of a joint between waypoints, likewise [rad]
-_DAMPING = 1e-6  # of the inverse kinematics [m^2]
-_ITERATIONS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +99,7 @@ def _finger_approach(hand: Hand, reach: Reach, i: int, collision: HandCollision)
     path = np.repeat(reach.q_standoff[None], len(along), axis=0)
     for k, s in enumerate(along):
         path[k, finger.q_indices] = _between(knots, s, before, behind)
-        path[k] = _pull(hand, finger, reach.X_WB, path[k], line[k])
+        path[k] = pulled(hand, finger, reach.X_WB, path[k], line[k])
     row = hand.fingers.index(finger)
     tips = np.array([hand.at(q, reach.X_WB).pad_centres[row] for q in path])
     off_line = np.linalg.norm(tips - line, axis=1)
@@ -135,21 +134,6 @@ def _between(knots: list[Array], s: float, before: float, behind: float) -> Arra
         return np.asarray(knots[1] + share * (knots[0] - knots[1]))
     share = -s / max(behind, 1e-9)
     return np.asarray(knots[1] + share * (knots[2] - knots[1]))
-
-
-def _pull(hand: Hand, finger: Finger, X_WB: pin.SE3, q: Array, target: Array) -> Array:
-    """The finger's joints moved until its pad is at the target, within their limits."""
-    row, joints = hand.fingers.index(finger), finger.q_indices
-    q = q.copy()
-    for _ in range(_ITERATIONS):
-        pose = hand.at(q, X_WB)
-        error = target - pose.pad_centres[row]
-        if np.linalg.norm(error) < 1e-7:
-            break
-        J = pose.pad_jacobian(finger)[:, joints]
-        step = J.T @ np.linalg.solve(J @ J.T + _DAMPING * np.eye(3), error)
-        q[joints] = np.clip(q[joints] + step, hand.lower[joints], hand.upper[joints])
-    return q
 
 
 def _frozen(values: Array) -> Array:

@@ -10,7 +10,8 @@ once per set of fingers; contacts, object, base and cone are parameters.
                 pad centre = p + (radius + standoff) n         stand-off
                 pad centre = p + (radius - overshoot) n        overshoot
                 pad normal within the cone about -n            wider off the contact
-                distance(link sphere) >= its radius + clearance, at contact and stand-off
+                distance(link sphere) >= its radius + clearance, at contact and stand-off,
+                there of what has moved
                 base turned from nominal by at most its range, q within limits
 
 All rows but the bounds share one slack at a high price, so that every quadratic subproblem has a
@@ -138,13 +139,13 @@ class ReachModel:
             target = p.points + ca.repmat(away.T, 3, 1) * p.normals
             equal.append(ca.vec(centres - target) / LENGTH)
             cones.append((-ca.sum1(normals * p.normals) - cone).T)
-        clearances = [self._clearance(w.q, base, p, pads=False)]
+        clearances = [self._clearance(w.q, base, p, self._apart)]
         if shape.by_fingers:
-            clearances.append(self._clearance(w.q_standoff, base, p, pads=True))
+            clearances.append(self._clearance(w.q_standoff, base, p, self._moving))
         if shape.motion == "arm":
             for share in _RETREATED:
                 away = (w.x + share * p.retreat / LENGTH, *base[1:])
-                clearances.append(self._clearance(w.q, away, p, pads=False))
+                clearances.append(self._clearance(w.q, away, p, self._apart))
         R = turned(w.s, p.R_start)
         turn = (ca.trace(p.R_nominal.T @ R) - 1) / 2 - p.least_cosine
         gap = ca.vertcat(*equal)
@@ -156,11 +157,24 @@ class ReachModel:
             "g": ca.vertcat(*rows) + w.slack,
         }
 
-    def _clearance(self, q: ca.MX, base: tuple[ca.MX, ...], p: Parameters, *, pads: bool) -> ca.MX:
-        """Column of distances less radius and clearance; pads that touch are left out."""
+    @property
+    def _apart(self) -> NDArray[np.intp]:
+        """The spheres that may not touch at the contact: all but the touching pads."""
+        touching = np.isin(self.spheres.finger_indices, self.fingers)
+        return np.flatnonzero(~(self.spheres.is_pad & touching))
+
+    @property
+    def _moving(self) -> NDArray[np.intp]:
+        """The spheres that the touching fingers move to the stand-off, pads included."""
+        names = [name for f in self.fingers for name in self.hand.fingers[f].joints]
+        joints = [int(self.hand.model.getJointId(name)) for name in names]
+        return np.flatnonzero(np.isin(self.spheres.joints, joints))
+
+    def _clearance(
+        self, q: ca.MX, base: tuple[ca.MX, ...], p: Parameters, kept: NDArray[np.intp]
+    ) -> ca.MX:
+        """Column of distances less radius and clearance, of the spheres kept."""
         spheres = self.spheres
-        touching = spheres.is_pad & np.isin(spheres.finger_indices, self.fingers)
-        kept = np.arange(len(touching)) if pads else np.flatnonzero(~touching)
         points = self._links(q, *base)[:, kept.tolist()]
         distance = signed_distance(points, p.solid)
         table = p.table[:3].T @ points - p.table[3]

@@ -10,6 +10,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from planner.pull import pulled
 from planner.reach_kinematics import LENGTH
 from planner.reach_model import ReachModel, pack_parameters
 from planner.solid import RevolvedSolid
@@ -21,6 +22,7 @@ Array = NDArray[np.float64]
 _HULL_MARGIN = 1e-3  # asked of the spheres on top, as hulls stand out of them [m]
 _FREE_TRAVEL = 0.15  # of a free base from its start [m]
 _FREE_TURN = 0.6  # bound on each modified Rodrigues parameter of it
+_PULLS = 3  # steps of a guess off the contact
 _NO_TABLE = (0.0, 0.0, 1.0, -1e3)
 
 
@@ -171,12 +173,22 @@ def _parameters(
 
 def _guess(model: ReachModel, task: ReachTask, start: Start) -> Array:
     shape, options = model.shape, task.options
-    moving = start.q[list(shape.moving)]
     parts = [np.zeros(7), start.q]  # no slack, the base where it starts
     if shape.by_fingers:
         half = [options.least_standoff, options.least_overshoot]
-        parts += [moving, moving, np.repeat(half, shape.contacts) / LENGTH]
+        moved = [_moved(model, task, start, away) for away in (half[0], -half[1])]
+        parts += [*moved, np.repeat(half, shape.contacts) / LENGTH]
     return np.concatenate(parts)
+
+
+def _moved(model: ReachModel, task: ReachTask, start: Start, away: float) -> Array:
+    """The touching fingers' joints with their pads pulled along the normals, roughly."""
+    q = start.q
+    for name, p, n in zip(start.fingers, task.points, task.normals, strict=True):
+        finger = model.hand.finger(name)
+        target = p + (finger.pad_radius + away) * n
+        q = pulled(model.hand, finger, start.X_WB, q, target, iterations=_PULLS)
+    return np.asarray(q[list(model.shape.moving)])
 
 
 def _unknown_bounds(model: ReachModel, task: ReachTask, start: Start) -> tuple[Array, Array]:

@@ -1,8 +1,11 @@
-"""The planner measured where it matters: planned against random contacts, on the same beliefs.
+"""The planner measured where it matters: on the hand, against random contacts and an oracle.
 
-For every object and seed the same true object, the same wrong belief and the same sensor are met
-twice: by contacts the planner chose and by random contacts the same hand reaches. What counts is
-the estimate after the first placement that felt three contacts.
+For every family and seed the same random object, the same wrong belief and the same sensor are met
+by every arm (`touch_sessions`).
+
+Arms
+    planned  the planner;  rule  the paper's 90-degree rule;  random  anything the hand reaches
+    oracle   the first placement planned by somebody who knows the object
 
 Settings
     coarse   belief wrong by 15 deg and 15 mm
@@ -10,46 +13,32 @@ Settings
     offset   coarse, and the sensor turns all directions by 8 deg without telling anybody
     told     the same, but planner and estimator know that there may be such an offset
 
-Prints medians with 95 % bootstrap intervals; the counts are the runs.
+Prints medians with half their 95 % bootstrap intervals; the counts are the runs.
 
-Example: python scripts/benchmark.py touches --runs 20 --objects can bottle
+Example: python scripts/benchmark.py touches --runs 20 --families cone vase
 """
 
 from __future__ import annotations
 
-import contextlib
 import json
 import sys
-from dataclasses import asdict, dataclass, replace
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
+from honesty import Interval, bootstrap, proportion
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
+from scenarios import FAMILIES
+from touch_sessions import ARMS, SETTINGS, Job, Outcome, run
 
-from estimator.axis import Axis, angle_between, offset_at
-from estimator.belief import Belief, update
-from estimator.contact import Contact, Miss, SensorNoise
-from estimator.readings import UMBILIC
 from estimator.sensors import sensor_noise
-from estimator.singular import placed_triples, singularities
-from estimator.surface import SurfaceOfRevolution
+from estimator.vectors import Array
 from hand_models import load_hand
-from hand_models.hand import Hand
-from planner.explore import explore
-from planner.goal import Goal
-from planner.options import Criterion, PlannerOptions
-from planner.plan import NoPlan, Probe
-from sim_sensor.camera import coarse_view
-from sim_sensor.noise import simulated_sensor
-from sim_sensor.objects import load_object
-from sim_sensor.world import TouchRecord, World
-
-SETTINGS = ("coarse", "weak", "offset", "told")
-OFFSET = float(np.deg2rad(8.0))
-CRITERIA: tuple[Criterion, ...] = ("information", "random")
+from planner.choice import MARGIN
 
 
 @dataclass(frozen=True)
@@ -57,211 +46,148 @@ class Options:
     """Command line of `benchmark.py touches`."""
 
     runs: int = 20
-    """Seeds per object, setting and criterion."""
-    objects: tuple[str, ...] = ("can", "cone", "barrel", "bottle", "paper-lathe")
+    """Seeds per family, setting and arm."""
+    families: tuple[str, ...] = FAMILIES
     settings: tuple[str, ...] = SETTINGS
+    arms: tuple[str, ...] = ("planned", "random")
     sensor: str = "gel"
     hand: str = "allegro_right"
+    budget: int = 18
+    """Largest number of touches of a session."""
+    jobs: int = 1
+    """Sessions at the same time."""
+    seed: int = 0
+    """The first; the others count on."""
     out: Path | None = None
     """Write every run as one JSON line into this file."""
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """One run: the estimate after the first three contacts."""
-
-    setting: str
-    criterion: str
-    object: str
-    seed: int
-    contacts: int
-    touches: int
-    angle_deg: float
-    offset_mm: float
-    labels_right: bool
-    singular: bool
-    verdict: str
 
 
 def main(options: Options) -> int:
     console = Console()
     try:
         _require_sane(options)
-        for name in options.objects:
-            load_object(name)
-        sensor_noise(options.sensor)
-        hand = load_hand(options.hand)
     except (ValueError, OSError) as error:
         print(f"benchmark: {error}", file=sys.stderr)
         return 2
     jobs = [
-        (setting, criterion, name, seed)
+        Job(options.hand, options.sensor, setting, arm, family, seed, options.budget)
+        for seed in range(options.seed, options.seed + options.runs)
         for setting in options.settings
-        for criterion in CRITERIA
-        for name in options.objects
-        for seed in range(options.runs)
+        for arm in options.arms
+        for family in options.families
     ]
-    outcomes = []
-    for job in track(jobs, description="touching", console=console, transient=True):
-        outcome = _run(hand, options.sensor, *job)
-        outcomes.append(outcome)
-        if options.out is not None:
-            with options.out.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(asdict(outcome)) + "\n")
+    outcomes: list[Outcome] = []
+    with ProcessPoolExecutor(options.jobs) as pool:
+        futures = [pool.submit(run, job) for job in jobs]
+        for future in track(
+            as_completed(futures), "touching", len(jobs), console=console, transient=True
+        ):
+            outcomes.append(future.result())
+            if options.out is not None:
+                with options.out.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps(asdict(outcomes[-1])) + "\n")
     for setting in options.settings:
-        console.print(_table(setting, options.objects, outcomes))
+        for table in tables(setting, options.arms, options.families, outcomes):
+            console.print(table)
     return 0
 
 
 def _require_sane(options: Options) -> None:
-    if not options.settings or not set(options.settings) <= set(SETTINGS):
-        raise ValueError(f"--settings: expected some of {', '.join(SETTINGS)}")
-    if options.runs < 1 or not options.objects:
-        raise ValueError("--runs and --objects: expected at least one")
+    for name, chosen, known in (
+        ("--settings", options.settings, SETTINGS),
+        ("--arms", options.arms, tuple(ARMS)),
+        ("--families", options.families, FAMILIES),
+    ):
+        if not chosen or not set(chosen) <= set(known):
+            raise ValueError(f"{name}: expected some of {', '.join(known)}")
+    if min(options.runs, options.budget, options.jobs) < 1 or options.seed < 0:
+        raise ValueError("--runs, --budget and --jobs: expected at least one; --seed: 0 or more")
+    sensor_noise(options.sensor)
+    load_hand(options.hand)
     if options.out is not None:
         options.out.open("a").close()
 
 
-def _run(
-    hand: Hand, sensor: str, setting: str, criterion: Criterion, name: str, seed: int
-) -> Outcome:
-    rng = np.random.default_rng([seed, 7])
-    surface = SurfaceOfRevolution(
-        Axis([0.5, 0.0, 0.2], [0.2 * rng.normal(), 0.2 * rng.normal(), 1.0]), load_object(name)
-    )
-    belief = _belief(surface, setting, rng)
-    simulated = simulated_sensor(sensor)
-    offset = OFFSET if setting in ("offset", "told") else None
-    told = sensor_noise(sensor)
-    if setting == "told":
-        told = replace(told, direction_offset=OFFSET)
-    session = simulated.session(rng=rng, direction_offset=offset)
-    world = World(surface, session, rng=rng)
-    after, touches = _first_three(hand, belief, told, world, criterion, seed)
-    return _judge(after, touches, world, surface, (setting, criterion, name, seed))
+def tables(
+    setting: str, arms: tuple[str, ...], families: tuple[str, ...], outcomes: list[Outcome]
+) -> tuple[Table, Table]:
+    """How well the axis is known after one and two placements, and how sessions end.
 
-
-def _belief(surface: SurfaceOfRevolution, setting: str, rng: np.random.Generator) -> Belief:
-    if setting != "weak":
-        return coarse_view(surface, angle=np.deg2rad(15.0), offset=0.015, rng=rng)
-    angle = np.deg2rad(60.0) * np.sqrt(rng.uniform(0.01, 1.0))
-    return coarse_view(surface, angle=angle, offset=0.04 * rng.uniform(0.1, 1.0), rng=rng)
-
-
-def _first_three(
-    hand: Hand, belief: Belief, told: SensorNoise, world: World, criterion: Criterion, seed: int
-) -> tuple[Belief, int]:
-    """The belief as soon as three contacts were felt, and the touches that took, at most nine."""
-
-    def touch(probe: Probe) -> Contact | Miss:
-        outcome = world.touch(probe.approach)
-        return outcome if isinstance(outcome, Miss) else replace(outcome, noise=told)
-
-    steps = explore(
-        hand,
-        touch,
-        belief,
-        told,
-        goal=Goal(np.deg2rad(3.0), 2e-3),
-        budget=9,
-        rng=np.random.default_rng([seed, 1]),
-        options=PlannerOptions(criterion=criterion),
-    )
-    outcomes: list[Contact | Miss] = []
-    with contextlib.suppress(NoPlan):
-        for step in steps:
-            for outcome in step.outcomes:
-                outcomes.append(outcome)
-                if sum(isinstance(o, Contact) for o in outcomes) == 3:
-                    return update(belief, outcomes), len(outcomes)
-    return update(belief, outcomes), len(outcomes)
-
-
-def _judge(
-    after: Belief,
-    touches: int,
-    world: World,
-    surface: SurfaceOfRevolution,
-    job: tuple[str, str, str, int],
-) -> Outcome:
-    felt = [r for r in world.records if r.truth is not None][: len(after.contacts)]
-    if len(felt) < 3 or after.estimate is None:
-        return Outcome(*job, len(felt), touches, 90.0, 1e3, False, False, "no three contacts")
-    middle = surface.axis.point + np.mean(surface.profile.z_range) * surface.axis.direction
-    rows = after.estimate.best.parallel_rows
-    return Outcome(
-        *job,
-        contacts=len(felt),
-        touches=touches,
-        angle_deg=float(np.rad2deg(angle_between(after.axis, surface.axis))),
-        offset_mm=1e3 * offset_at(after.axis, surface.axis, middle),
-        labels_right=all(_label_right(r, p) for r, p in zip(felt, rows, strict=True)),
-        singular=_singular(surface, felt),
-        verdict=after.estimate.verdict,
-    )
-
-
-def _label_right(record: TouchRecord, row_0: float) -> bool:
-    """Whether the row believed to be the parallel's is the one nearer to the true parallel.
-
-    A flat end or an umbilic has no directions, so nothing there can be taken wrongly.
+    After one: median errors; right labels, also after one more touch where they were in doubt.
+    After two: root mean square errors. `< 0.08`: plans that came so near to a singularity.
     """
-    assert isinstance(record.outcome, Contact)
-    assert record.truth is not None
-    if record.outcome.umbilicity < UMBILIC:
-        return True
-    nearer = int(np.argmax(np.abs(record.outcome.directions @ record.truth.k_theta)))
-    return (row_0 > 0.5) == (nearer == 0)
-
-
-def _singular(surface: SurfaceOfRevolution, felt: list[TouchRecord]) -> bool:
-    """Whether the first three contacts are exactly singular on the true object."""
-    if len(felt) < 3:
-        return False
-    p = np.array([r.truth.p for r in felt[:3] if r.truth is not None])
-    theta, _, z = surface.cylindrical(p)
-    z = np.clip(z, *surface.profile.z_range)
-    triples = placed_triples(surface.profile, theta[None], z[None])
-    return bool(singularities(triples, tolerance=1e-6).present.any())
-
-
-def _table(setting: str, objects: tuple[str, ...], outcomes: list[Outcome]) -> Table:
-    table = Table(title=f"{setting}: after the first three contacts", box=SIMPLE_HEAD)
-    for heading in ("object", "contacts", "runs", "labels right", "median deg", "p95 deg",
-                    "median mm", "touches", "singular", "determined"):  # fmt: skip
-        table.add_column(heading, justify="left" if heading in ("object", "contacts") else "right")
-    for name in (*objects, "all"):
-        for criterion in CRITERIA:
+    errors = _table(
+        f"{setting}: after one placement; after two, rms",
+        ("family", "arm", "runs", "deg", "p95", "mm", "labels %", "one more", "2: deg", "2: mm"),
+    )
+    ends = _table(
+        f"{setting}: sessions to 3 deg and 2 mm",
+        ("family", "arm", "goal met %", "touches", "mean", "wrong", f"< {MARGIN:g}", "plan s"),
+    )
+    for family in (*families, "all"):
+        for arm in arms:
             chosen = [
                 o
                 for o in outcomes
-                if o.setting == setting
-                and o.criterion == criterion
-                and (name == "all" or o.object == name)
+                if (o.job.setting, o.job.arm) == (setting, arm) and family in (o.job.family, "all")
             ]
-            touched = "planned" if criterion == "information" else "random"
-            table.add_row(name, touched, *_row(chosen))
+            errors.add_row(family, arm, *_errors(chosen))
+            ends.add_row(family, arm, *_ends(chosen))
+    return errors, ends
+
+
+def _table(title: str, headings: tuple[str, ...]) -> Table:
+    table = Table(title=title, box=SIMPLE_HEAD, pad_edge=False)
+    for heading in headings:
+        side = "left" if heading in ("family", "arm") else "right"
+        table.add_column(heading, justify=side, no_wrap=True)
     return table
 
 
-def _row(chosen: list[Outcome]) -> list[str]:
-    angle = np.array([o.angle_deg for o in chosen])
-    offset = np.array([o.offset_mm for o in chosen])
+def _errors(chosen: list[Outcome]) -> list[str]:
+    deg, mm = (_values(chosen, name) for name in ("first_deg", "first_mm"))
     return [
         str(len(chosen)),
-        f"{100 * np.mean([o.labels_right for o in chosen]):.0f} %",
-        _median(angle),
-        f"{np.percentile(angle, 95):.1f}",
-        _median(offset),
-        f"{np.mean([o.touches for o in chosen]):.1f}",
-        str(sum(o.singular for o in chosen)),
-        f"{100 * np.mean([o.verdict == 'determined' for o in chosen]):.0f} %",
+        _figure(bootstrap(deg, np.median)),
+        f"{np.percentile(deg, 95):.1f}" if len(deg) else "-",
+        _figure(bootstrap(mm, np.median)),
+        _share([o.labels for o in chosen]),
+        _share([o.labels_soon for o in chosen]),
+        _figure(bootstrap(_values(chosen, "second_deg"), _rms)),
+        _figure(bootstrap(_values(chosen, "second_mm"), _rms)),
     ]
 
 
-def _median(values: np.ndarray) -> str:
-    """Median with its 95 % bootstrap interval."""
-    rng = np.random.default_rng(0)
-    medians = np.median(rng.choice(values, size=(400, len(values))), axis=1)
-    low, high = np.percentile(medians, [2.5, 97.5])
-    return f"{np.median(values):.2f} [{low:.2f}, {high:.2f}]"
+def _ends(chosen: list[Outcome]) -> list[str]:
+    """A session that never met its goal took more touches than any that did."""
+    touches = np.array([o.touches if o.met else np.inf for o in chosen])
+    margin, seconds = (_values(chosen, name) for name in ("margin", "plan_seconds"))
+    made = np.array([o.touches for o in chosen])
+    return [
+        _share([o.met for o in chosen]),
+        f"{np.median(touches):.0f}" if len(touches) else "-",
+        f"{made.mean():.1f}" if len(made) else "-",
+        f"{sum(o.wrong for o in chosen)}",
+        f"{100 * np.mean(margin < MARGIN):.1f} %" if len(margin) else "-",
+        f"{np.median(seconds):.2f}" if len(seconds) else "-",
+    ]
+
+
+def _values(chosen: list[Outcome], name: str) -> Array:
+    values = np.array([getattr(o, name) for o in chosen], dtype=float)
+    return values[np.isfinite(values)]
+
+
+def _rms(values: Array, axis: int) -> Array:
+    return np.asarray(np.sqrt(np.mean(values**2, axis=axis)))
+
+
+def _share(hits: list[bool]) -> str:
+    share = proportion(np.array(hits, dtype=bool))
+    return f"{100 * share.value:.0f} [{100 * share.low:.0f}-{100 * share.high:.0f}]"
+
+
+def _figure(figure: Interval) -> str:
+    if not np.isfinite(figure.value):
+        return "-"
+    return f"{figure.value:.2f} ±{0.5 * (figure.high - figure.low):.2f}"

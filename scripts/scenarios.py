@@ -84,9 +84,13 @@ def draw_scenes(
     return posed(geometry, shapes.radius[:, 0], rng=rng)
 
 
-def draw_shapes(family: str, count: int, *, rng: np.random.Generator) -> Shapes:
+def draw_shapes(
+    family: str, count: int, *, rng: np.random.Generator, radii: tuple[float, float] = RADII
+) -> Shapes:
     """Random profiles of one family.
 
+    Args:
+        radii: Least and largest radius at half height [m].
     Raises:
         ValueError: Unknown family; lists the known ones.
     """
@@ -97,7 +101,7 @@ def draw_shapes(family: str, count: int, *, rng: np.random.Generator) -> Shapes:
         return rng.uniform(low, high, size=(count, 1))
 
     curve, half_height = _FAMILIES[family](uniform)
-    return Shapes(curve, uniform(*RADII), half_height)
+    return Shapes(curve, uniform(*radii), half_height)
 
 
 def upright(shapes: Shapes, theta: Array, z: Array) -> Geometry:

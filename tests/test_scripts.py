@@ -117,11 +117,13 @@ def test_an_arm_with_a_small_workspace_still_finds_the_axis(tmp_path):
 
 def test_benchmark_of_touches_runs(tmp_path):
     lines = tmp_path / "runs.jsonl"
-    chosen = ("--runs", 1, "--objects", "can", "--settings", "coarse", "--out", lines)
-    done = script("benchmark", "touches", *chosen)
+    chosen = ("--runs", 1, "--families", "barrel", "--settings", "coarse", "--out", lines)
+    done = script("benchmark", "touches", *chosen, "--arms", "planned", "oracle", "--budget", 6)
     assert done.returncode == 0, done.stderr
+    assert "after one placement" in done.stdout
     runs = [json.loads(line) for line in lines.read_text().splitlines()]
-    assert [run["criterion"] for run in runs] == ["information", "random"]
+    assert sorted(run["job"]["arm"] for run in runs) == ["oracle", "planned"]
+    assert all(run["first_deg"] < 30.0 for run in runs)
 
 
 def test_benchmark_of_estimators_runs(tmp_path):
@@ -147,8 +149,9 @@ def test_benchmark_of_estimators_runs(tmp_path):
 def test_benchmark_refuses_before_it_runs(tmp_path):
     refused(script("benchmark", "touches", "--out", tmp_path), "")
     refused(script("benchmark", "touches", "--settings", "easy"), "--settings: expected some of")
-    refused(script("benchmark", "touches", "--objects", "teapot"), "teapot")
-    refused(script("benchmark", "touches", "--runs", 0), "--runs and --objects")
+    refused(script("benchmark", "touches", "--families", "teapot"), "--families: expected some")
+    refused(script("benchmark", "touches", "--arms", "guess"), "--arms: expected some of planned")
+    refused(script("benchmark", "touches", "--runs", 0), "--runs, --budget and --jobs")
 
 
 @pytest.mark.parametrize(
