@@ -97,7 +97,7 @@ def planned_touches(hand: str, name: str, seed: int) -> Iterator[Touch]:
     surface = SurfaceOfRevolution(pose_in("mujoco", rng), load_object(name))
     plan = _plan(hand, surface, rng)
     world = MujocoWorld(
-        _hand(hand), surface, rng=rng, models=_models(hand, name, "mujoco"), noisy=False
+        _hand(hand), surface, rng=rng, models=_models(hand, name, None), noisy=False
     )
     for probe in plan.probes:
         world.touch(probe.approach, finger_axis_W=probe.approach.finger_axis)
@@ -107,12 +107,16 @@ def planned_touches(hand: str, name: str, seed: int) -> Iterator[Touch]:
         yield Touch(name, seed, probe.finger, off, told.force, told.bumped)
 
 
-def session(hand: str, name: str, seed: int, world: str) -> Session:
-    """The main job without its grasp, the same object and camera in every world."""
+def session(hand: str, name: str, seed: int, world: str, *, mass: float = 0.3) -> Session:
+    """The main job without its grasp, the same object and camera in every world.
+
+    Args:
+        mass: Of an object that stands on a table [kg].
+    """
     rng = np.random.default_rng(seed)
     surface = SurfaceOfRevolution(pose_in(world, rng), load_object(name))
     belief = coarse_view(surface, angle=ANGLE, offset=OFFSET, rng=rng)
-    here = _world(hand, name, surface, world, rng)
+    here = _world(hand, name, surface, world, mass, rng)
     steps: list[Step] = []
     reason = ""
     try:
@@ -173,12 +177,17 @@ def _told(
 
 
 def _world(
-    hand: str, name: str, surface: SurfaceOfRevolution, world: str, rng: np.random.Generator
+    hand: str,
+    name: str,
+    surface: SurfaceOfRevolution,
+    world: str,
+    mass: float,
+    rng: np.random.Generator,
 ) -> World | MujocoWorld:
     if world == "own":
         return build_world(world, _hand(hand), surface, SENSOR, rng)
-    standing = Standing() if world == "mujoco-table" else None
-    models = _models(hand, name, world)
+    standing = Standing(mass) if world == "mujoco-table" else None
+    models = _models(hand, name, standing)
     return MujocoWorld(_hand(hand), surface, rng=rng, standing=standing, models=models)
 
 
@@ -188,8 +197,7 @@ def _hand(name: str) -> Hand:
 
 
 @lru_cache(maxsize=32)
-def _models(hand: str, name: str, world: str) -> Models:
+def _models(hand: str, name: str, standing: Standing | None) -> Models:
     """Of an object anywhere: an octree takes seconds."""
     upright = pose_in("mujoco-table", np.random.default_rng(0))
-    surface = SurfaceOfRevolution(upright, load_object(name))
-    return build_models(_hand(hand), surface, Standing() if world == "mujoco-table" else None)
+    return build_models(_hand(hand), SurfaceOfRevolution(upright, load_object(name)), standing)

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import refused, script
 from products import PRODUCTS, needs_products, product
 from scipy.spatial import cKDTree
 
@@ -147,8 +146,9 @@ def test_a_file_that_is_no_product_is_refused_with_its_field(
         load_object(written(tmp_path, content))
 
 
-def test_a_product_that_is_missing_is_refused_by_the_main_script(tmp_path: Path) -> None:
-    refused(script("plan_grasp", "--object", tmp_path / "no.json"), "there is no such file")
+def test_a_product_that_is_missing_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="there is no such file"):
+        load_object(tmp_path / "no.json")
 
 
 @needs_products
