@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from estimator.belief import update
+from estimator.belief import Belief, update
 from estimator.contact import Contact, Miss
 from estimator.readers.raw_files import RawTouches
 from estimator.readers.raw_sensors import DepthPad, raw_sensor
+from estimator.records import estimate_record
 from estimator.surface import SurfaceOfRevolution
 from planner.explore import Step
 from planner.grasp_travel import GraspMotion
+from planner.messages import step_record
 from planner.plan import Probe
 from planner.round_motion import RoundMotion
 from sim_sensor.episode import Act, BelievedAxis, Episode, Grip
@@ -128,6 +131,17 @@ def episode_of(
             )
             belief = after
     return Episode(surface, tuple(acts), conclusion=conclusion, grip=grip)
+
+
+def belief_record(belief: Belief, steps: list[Step]) -> dict[str, Any]:
+    """The part of result.json that says what is known, and what it was learnt from."""
+    return {
+        "verdict": belief.estimate.verdict if belief.estimate else "undetermined",
+        "touches": steps[-1].touches if steps else 0,
+        "estimate": estimate_record(belief.estimate) if belief.estimate else None,
+        "covariance": belief.covariance.tolist(),
+        "rounds": [step_record(step) for step in steps],
+    }
 
 
 def raw_touches(sensor: str, steps: list[Step], world: World) -> RawTouches | None:

@@ -50,6 +50,7 @@ from sim_sensor.objects import load_object
 
 OBJECTS = ("can", "bottle", "cone", "cup", "barrel", "vase", "knob", "egg")
 TABLE_BELOW = 0.16  # the object's middle, at least [m]
+HAND_LENGTH = 0.28  # and half a box [m]
 GOAL = Goal(float(np.deg2rad(3.0)), 2e-3)
 MOTION_WORDS = ("approach:", "on the way", "no straight way out")
 
@@ -159,10 +160,16 @@ def draw_scene(hand: Hand, rng: np.random.Generator) -> Scene:
     turn = pin.rpy.rpyToMatrix(*rng.uniform([-0.5, 0.5, -0.8], [0.5, 1.6, 0.8]))
     place = np.array([0.5, 0.0, 0.2]) + rng.uniform([-0.45, -0.3, 0.0], [-0.25, 0.3, 0.35])
     start = Configuration(hand.middle, pin.SE3(turn, place))
-    boxes = tuple(_box(k, rng) for k in range(rng.integers(0, 4)))
+    drawn = (_box(k, rng) for k in range(rng.integers(0, 4)))
+    boxes = tuple(box for box in drawn if _far(box, start))
     low = float(truth.profile.z_range[0])
     table = 0.2 + min(low, -TABLE_BELOW) - 0.02 if rng.random() < 0.5 else None
     return Scene(name, truth, belief, start, boxes, table)
+
+
+def _far(box: Box, start: Configuration) -> bool:
+    """Not where the hand is."""
+    return bool(np.linalg.norm(box.centre - start.X_WB.translation) > HAND_LENGTH)
 
 
 def _box(k: int, rng: np.random.Generator) -> Box:

@@ -31,7 +31,8 @@ import pinocchio as pin
 import tyro
 from grasp_ending import Ending, ending, ending_record, grip_of, print_ending
 from grasp_moves import act_motions, from_home, left_at
-from grasp_report import episode_of, print_round, raw_touches
+from grasp_report import belief_record, episode_of, print_round, raw_touches
+from obstacle_file import read_obstacles
 from output_files import require_writable, write_whole
 from rich.console import Console
 
@@ -40,7 +41,6 @@ from estimator.belief import Belief
 from estimator.contact import Contact, Miss, SensorNoise
 from estimator.readers.raw_files import write_raw
 from estimator.readers.raw_sensors import RAW_SENSORS
-from estimator.records import estimate_record
 from estimator.sensors import sensor_noise
 from estimator.surface import SurfaceOfRevolution
 from hand_models import HandError, load_hand
@@ -48,7 +48,7 @@ from hand_models.hand import Hand
 from planner.explore import Step, explore
 from planner.goal import Goal
 from planner.grasp import Friction, GraspOptions
-from planner.messages import plan_document, step_record
+from planner.messages import plan_document
 from planner.options import PlannerOptions
 from planner.plan import NoPlan, Probe
 from planner.workspace import Workspace
@@ -86,6 +86,8 @@ class Options:
     Not given, the arm reaches everywhere."""
     wrist_range_mm: float = 150.0
     """How far from there, along each axis, the arm can go; it turns the hand any way."""
+    obstacles: Path | None = None
+    """A TOML file of a table and boxes that the hand must not meet (scripts/obstacle_file.py)."""
     budget: int = 15
     """Largest number of touches."""
     grasp_heights_mm: tuple[float, float] | None = None
@@ -174,15 +176,15 @@ def _mounted(name: str, surface: SurfaceOfRevolution, rng: np.random.Generator) 
 
 
 def _planner_options(options: Options) -> PlannerOptions:
-    """The planner's defaults, within the arm's workspace."""
+    """The planner's defaults, within the arm's workspace, among the obstacles."""
+    reach = replace(PlannerOptions().reach, **read_obstacles(options.obstacles))
     if options.wrist_mm is None:
-        return PlannerOptions()
+        return PlannerOptions(reach=reach)
     if not np.all(np.isfinite(options.wrist_mm)):
         raise ValueError(f"--wrist-mm: expected three finite numbers, got {options.wrist_mm}")
     X_WB = pin.SE3(np.eye(3), 1e-3 * np.array(options.wrist_mm))
     workspace = Workspace(X_WB, 1e-3 * options.wrist_range_mm, np.pi)
-    reach = replace(PlannerOptions().reach, workspace=workspace)
-    return PlannerOptions(reach=reach)
+    return PlannerOptions(reach=replace(reach, workspace=workspace))
 
 
 def _grasp_options(options: Options) -> GraspOptions:
@@ -192,10 +194,10 @@ def _grasp_options(options: Options) -> GraspOptions:
         raise ValueError(f"--grasp-heights-mm: expected low < high, got {heights}")
     if not (np.isfinite(options.friction) and options.friction > 0.0):
         raise ValueError(f"--friction: expected a number > 0, got {options.friction}")
-    default = GraspOptions()
+    default, told = GraspOptions(), _planner_options(options).reach
     return replace(
         default,
-        reach=replace(default.reach, workspace=_planner_options(options).reach.workspace),
+        reach=replace(default.reach, workspace=told.workspace, table=told.table, boxes=told.boxes),
         heights=None if heights is None else (1e-3 * heights[0], 1e-3 * heights[1]),
         friction=Friction(options.friction),
     )
@@ -253,17 +255,13 @@ def _conclude(
     result = {
         "goal_met": met,
         "reason": reason,
-        "verdict": belief.estimate.verdict if belief.estimate else "undetermined",
-        "touches": steps[-1].touches if steps else 0,
-        "estimate": estimate_record(belief.estimate) if belief.estimate else None,
-        "covariance": belief.covariance.tolist(),
+        **belief_record(belief, steps),
         "truth": {
             "axis": {"point": truth.point.tolist(), "direction": truth.direction.tolist()},
             "object": options.object,
         },
         "error": error,
         "goal": {"angle_deg": options.goal_angle_deg, "offset_mm": options.goal_offset_mm},
-        "rounds": [step_record(step) for step in steps],
         "grasp": ending_record(end),
     }
     document = plan_document(scenario.hand, [step.plan for step in steps], end.grasp)
