@@ -20,6 +20,7 @@ from planner.explore import Step
 from planner.grasp_travel import GraspMotion
 from planner.messages import step_record
 from planner.plan import Probe
+from planner.risk import risks_in_words
 from planner.round_motion import RoundMotion
 from sim_sensor.episode import Act, BelievedAxis, Episode, Grip
 from sim_sensor.feeling import Felt
@@ -51,6 +52,10 @@ def print_round(console: Console, step: Step, number: int) -> None:
             f"  worst case of the best pair {np.rad2deg(plan.bound.angle):.1f} deg, margin "
             f"{plan.margin:.2f} from: {plan.nearest}"
         )
+    if plan.choice is not None:
+        console.print(f"  {plan.choice.words}")
+    if plan.risks:
+        console.print(f"  {risks_in_words(plan.risks)}")
     if plan.motion is not None:
         console.print(f"  {motion_in_words(plan.motion)}")
     if step.surprise is not None:
