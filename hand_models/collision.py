@@ -7,7 +7,7 @@ works on other shapes (`hand_models.spheres`), so this check is independent of i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
@@ -17,6 +17,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from hand_models.bodies import Body
 from hand_models.geometry import link_points, pad_in_joint
 from hand_models.hand import Hand, HandError
 
@@ -67,6 +68,8 @@ class HandCollision:
         self._shapes, self._pad_ids = _shapes_and_pairs(hand)
         self._data = hand.model.createData()
         self._shape_data = pin.GeometryData(self._shapes)
+        self._geometries = [shape.geometry for shape in self._shapes.geometryObjects]
+        self._placed: tuple[Array, list[coal.Transform3s]] | None = None
 
     def is_self_free(self, q: ArrayLike) -> bool:
         """Whether no two links overlap; stops at the first that do."""
@@ -101,25 +104,63 @@ class HandCollision:
             slices: Convex parts of the object in its frame O, e.g. from `revolved_slices`.
             X_WO: Pose of the object.
         """
-        pin.updateGeometryPlacements(
-            self.hand.model, self._data, self._shapes, self._shape_data, np.asarray(q)
-        )
-        X_BO = X_WB.inverse() * X_WO
-        distances = np.array([self._to_object(i, slices, X_BO) for i in range(self._shapes.ngeoms)])
+        placed, there = self._placements(q), _transform(X_WB.inverse() * X_WO)
+        distances = np.array([self._distance(i, placed, slices, there) for i in range(len(placed))])
         links = [i for i in range(self._shapes.ngeoms) if i not in self._pad_ids]
         names = tuple(self._link(i) for i in links)
         return ObjectClearance(names, distances[links], distances[list(self._pad_ids)])
 
-    def _to_object(
-        self, shape: int, slices: Sequence[coal.CollisionGeometry], X_BO: pin.SE3
+    def nearest_to(
+        self, q: ArrayLike, X_WB: pin.SE3, body: Body, *, touching: Collection[str] = ()
+    ) -> LinkPair:
+        """The link, or pad, nearest to a body.
+
+        Args:
+            q: (nq,) joint positions.
+            X_WB: Pose of the hand base.
+            body: The body.
+            touching: Fingers whose pads do not count.
+        """
+        placed, there = self._placements(q), _transform(X_WB.inverse() * body.X_WO)
+        pads = zip(self._pad_ids, self.hand.fingers, strict=True)
+        exempt = {i for i, finger in pads if finger.name in touching}
+        around = body.parts if body.around is None else (body.around,)
+        bounds = [
+            (self._distance(i, placed, around, there), i)
+            for i in range(len(placed))
+            if i not in exempt
+        ]
+        least, nearest = min(bounds)
+        if body.around is not None:
+            least = np.inf
+            for bound, i in sorted(bounds):
+                if bound > least:
+                    break
+                exact = self._distance(i, placed, body.parts, there)
+                least, nearest = min((least, nearest), (exact, i))
+        return LinkPair(self._part(nearest), body.name, least)
+
+    def _placements(self, q: ArrayLike) -> list[coal.Transform3s]:
+        """Where each shape is in B; kept until the joints move."""
+        q = np.array(q, dtype=np.float64)
+        if self._placed is None or not np.array_equal(q, self._placed[0]):
+            pin.updateGeometryPlacements(
+                self.hand.model, self._data, self._shapes, self._shape_data, q
+            )
+            self._placed = (q, [_transform(X) for X in self._shape_data.oMg])
+        return self._placed[1]
+
+    def _distance(
+        self,
+        shape: int,
+        placed: list[coal.Transform3s],
+        parts: Sequence[coal.CollisionGeometry],
+        there: coal.Transform3s,
     ) -> float:
-        geometry = self._shapes.geometryObjects[shape].geometry
-        X_BS = self._shape_data.oMg[shape]
-        at = coal.Transform3s(X_BS.rotation, X_BS.translation)
-        there = coal.Transform3s(X_BO.rotation, X_BO.translation)
+        geometry, at = self._geometries[shape], placed[shape]
         request, result = coal.DistanceRequest(), coal.DistanceResult()
         nearest = np.inf
-        for part in slices:
+        for part in parts:
             result.clear()
             nearest = min(nearest, coal.distance(geometry, at, part, there, request, result))
         return float(nearest)
@@ -133,6 +174,12 @@ class HandCollision:
     def _named(self, pair: int, distance: float) -> LinkPair:
         ids = self._shapes.collisionPairs[pair]
         return LinkPair(self._link(int(ids.first)), self._link(int(ids.second)), distance)
+
+    def _part(self, shape: int) -> str:
+        """A pad by its finger, another shape by its link."""
+        if shape in self._pad_ids:
+            return f"the pad of {self.hand.fingers[self._pad_ids.index(shape)].name}"
+        return self._link(shape)
 
     def _link(self, shape: int) -> str:
         frame = self._shapes.geometryObjects[shape].parentFrame
@@ -222,6 +269,10 @@ def _pairs(model: pin.Model, shapes: pin.GeometryModel) -> list[tuple[int, int]]
         for j in range(i + 1, len(joints))
         if not near(joints[i], joints[j]) and not near(joints[j], joints[i])
     ]
+
+
+def _transform(X: pin.SE3) -> coal.Transform3s:
+    return coal.Transform3s(X.rotation, X.translation)
 
 
 def _is_solid(points: Array) -> bool:

@@ -2,7 +2,8 @@
 
 plan.json holds {"hand", "joint_names", "rounds": [plan, ...], "grasp": grasp or null}; the fields
 of a plan and of its probes are those of `plan_record` and `probe_record` below, those of a grasp
-of `grasp_record`.
+of `grasp_record`; what the hand does in time is in each one's "motion"
+(`planner.trajectory_messages`).
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from planner.grasp_outcome import Grasp
 from planner.optimum import ChoiceCertificate
 from planner.plan import Plan, Probe
 from planner.reach import Reach
+from planner.trajectory_messages import motion_record
 
 
 def plan_document(hand: Hand, plans: list[Plan], grasp: Grasp | None = None) -> dict[str, Any]:
@@ -47,6 +49,7 @@ def plan_record(plan: Plan) -> dict[str, Any]:
             "clearance": plan.retreat.clearance,
             "wanted": plan.retreat.wanted,
         },
+        "motion": None if plan.motion is None else motion_record(plan.motion),
         "bound": {"angle": _finite(plan.bound.angle), "position": _finite(plan.bound.position)},
         "expected_error": {"angle": _finite(plan.angle), "offset": _finite(plan.offset)},
         "predicted_covariance": plan.covariance.tolist(),
@@ -95,6 +98,7 @@ def grasp_record(hand: Hand, grasp: Grasp) -> dict[str, Any]:
             "torque_length": grasp.friction.torque_length,
         },
         "reach": reach_record(grasp.reach),
+        "motion": None if grasp.motion is None else motion_record(grasp.motion),
         "funnel": [{"reason": reason, "count": count} for reason, count in grasp.funnel],
     }
 

@@ -11,6 +11,8 @@ from planner.choice import MARGIN
 from planner.criteria import Criterion
 from planner.motion import FORCE_GOAL
 from planner.reach_task import ReachOptions
+from planner.timing import MotionLimits
+from planner.trajectory import Configuration
 
 OFFSET_GUARD = float(np.deg2rad(5.0))
 
@@ -22,7 +24,7 @@ class PlannerOptions:
     Args:
         reach: Rules of reachability: pad cone, clearances, the arm's workspace, stroke.
         fingers_at_once: Contacts of one placement of the hand; fewer where so many do not reach.
-        margin: Smallest margin from every singularity, kept by nine in ten sampled objects [-].
+        margin: Smallest margin from every singularity, kept by three in four sampled objects [-].
         placements: How many placements of the hand are fitted to the believed surface.
         objects: How many objects are drawn from the belief.
         tries: How many of the best placements are handed to the optimiser.
@@ -35,13 +37,16 @@ class PlannerOptions:
             (`planner.sweep`); criterion `information` only.
         certify: Whether a plan says how good it is among all touches that there are.
         force_goal: At which a touching finger stops [N].
+        start: Where the hand is; motions are planned from there (`planner.round_motion`), and a
+            placement that none leads to is refused. None plans no motions.
+        limits: Of speed and acceleration.
     """
 
     reach: ReachOptions = field(default_factory=lambda: ReachOptions(starts=0, rescues=1))
     fingers_at_once: int = 3
     margin: float = MARGIN
     placements: int = 480
-    objects: int = 20
+    objects: int = 24
     tries: int = 24
     offset_guard: float = OFFSET_GUARD
     criterion: Criterion = "information"
@@ -49,6 +54,8 @@ class PlannerOptions:
     sweep: bool = False
     certify: bool = True
     force_goal: float = FORCE_GOAL
+    start: Configuration | None = None
+    limits: MotionLimits = field(default_factory=MotionLimits)
 
     def __post_init__(self) -> None:
         if self.fingers_at_once not in (1, 2, 3):

@@ -8,7 +8,6 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-import pinocchio as pin
 
 from estimator.belief import Belief, sample_objects
 from estimator.bounds import AxisBound
@@ -26,18 +25,19 @@ from planner.optimum import certificate, value_at
 from planner.options import PlannerOptions
 from planner.plan_types import NoPlan, Plan, Probe
 from planner.reach import Reach, Unreachable
-from planner.retreat import Retreat, plan_retreat
+from planner.retreat import Retreat, ways_out
 from planner.risk import risks
-from planner.solid import RevolvedSolid
+from planner.round_motion import RoundMotion, plan_round
+from planner.solid import RevolvedSolid, believed_solid
 from planner.starts import Start
 from planner.sweep import FROM, swept, with_swept
+from planner.transfer import movable_among
 from planner.worth import Worth, guarded
 
 __all__ = ["NoPlan", "Plan", "Probe", "plan_preferred", "plan_probes"]
 
 Preference = Callable[[Candidates, Ranking], Index]
 
-SOLID_HEIGHTS = 101
 RISK_OBJECTS = 40
 
 
@@ -47,6 +47,7 @@ class _Made(NamedTuple):
     reach: Reach
     approaches: tuple[Approach, ...]
     retreat: Retreat
+    motion: RoundMotion | None
 
 
 def plan_probes(
@@ -138,7 +139,7 @@ def _best_placement(
     if prefer is not None:
         ranking = replace(ranking, order=prefer(candidates, ranking))
     funnel += tuple((f"{count} fingers: singular: {words}", n) for words, n in ranking.rejected)
-    solid = _solid(belief.surface)
+    solid = believed_solid(belief.surface)
     failures: dict[str, int] = {}
     for i in ranking.order[: options.tries].tolist():
         made = _made(tools, belief, options, solid, candidates, i)
@@ -183,13 +184,6 @@ def _candidates(
     return make(tools.reach_map, surface, workspace=workspace, count=several, rng=rng)
 
 
-def _solid(surface: SurfaceOfRevolution) -> RevolvedSolid:
-    """The believed object as the optimiser's obstacle."""
-    z = np.linspace(*surface.profile.z_range, SOLID_HEIGHTS)
-    X_WO = pin.SE3(np.ascontiguousarray(surface.frame.T), np.array(surface.axis.point))
-    return RevolvedSolid(X_WO, z, surface.profile.derivatives(z)[0])
-
-
 def _made(
     tools: HandTools,
     belief: Belief,
@@ -215,11 +209,13 @@ def _made(
         return reach.reason
     ways = plan_approaches(tools.hand, reach) if several else (approach_by_base(tools.hand, reach),)
     X_WB = reach.X_WB if several else ways[0].bases[0]
-    retreat = plan_retreat(
-        tools.hand, tools.spheres, belief, reach.q_standoff, X_WB, np.asarray(place.n)
-    )
     gentle = tuple(replace(way, force_goal=options.force_goal) for way in ways)
-    return _Made(reach, gentle, retreat)
+    out = ways_out(tools.hand, tools.spheres, belief, reach.q_standoff, X_WB, np.asarray(place.n))
+    if options.start is None:
+        return _Made(reach, gentle, out[0], None)
+    movable = movable_among(tools.hand, tools.collision, solid, options.reach, options.limits)
+    motion = plan_round(movable, gentle, out, options.start)
+    return motion if isinstance(motion, str) else _Made(reach, gentle, motion.retreat, motion)
 
 
 def _plan(
@@ -251,6 +247,7 @@ def _plan(
         label_probability=float(ranking.label_probability[i]),
         funnel=funnel,
         retreat=made.retreat,
+        motion=made.motion,
     )
 
 

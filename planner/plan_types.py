@@ -14,6 +14,7 @@ from planner.optimum import ChoiceCertificate
 from planner.reach import Reach
 from planner.retreat import Retreat
 from planner.risk import Risk
+from planner.round_motion import RoundMotion
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,13 +46,14 @@ class Plan:
         bound: Worst case of the axis from the best pair of the probes.
         covariance: Of the axis after the probes, if the object is as believed, (4, 4).
         angle, offset: Expected error of the axis after them, over the belief [rad], [m].
-        margin: From the nearest singularity, in nine of ten objects; inf below three contacts.
+        margin: From the nearest singularity, in three of four objects; inf below three contacts.
         nearest: That singularity in words.
         label_probability: That the labels come out right; NaN where it was not computed.
         funnel: How many candidates there were, and what refused the others.
         retreat: The hand's way out after the probes.
         risks: What is at least 5 % likely to leave the axis untold, the likeliest first.
         choice: How good these touches are among all that there are; None where not asked.
+        motion: All that the hand does, in time; None where it was not told where the hand is.
     """
 
     probes: tuple[Probe, ...]
@@ -67,6 +69,11 @@ class Plan:
     retreat: Retreat
     risks: tuple[Risk, ...] = ()
     choice: ChoiceCertificate | None = None
+    motion: RoundMotion | None = None
+
+    def chance_of(self, name: str) -> float:
+        """Of one of the risks (`planner.risk` names them); 0 where it is not worth saying."""
+        return next((risk.chance for risk in self.risks if risk.name == name), 0.0)
 
 
 class NoPlan(Exception):

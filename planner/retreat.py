@@ -51,7 +51,14 @@ class Retreat:
 def plan_retreat(
     hand: Hand, spheres: LinkSpheres, belief: Belief, q: Array, X_WB: pin.SE3, normals: Array
 ) -> Retreat:
-    """The shortest straight way out of the base; the clearest where none ends clear.
+    """The first of the ways out."""
+    return ways_out(hand, spheres, belief, q, X_WB, normals)[0]
+
+
+def ways_out(
+    hand: Hand, spheres: LinkSpheres, belief: Belief, q: Array, X_WB: pin.SE3, normals: Array
+) -> tuple[Retreat, ...]:
+    """Straight ways out of the base: those that end clear, the shortest first, then the clearest.
 
     Args:
         q: Joints with the fingers at their stand-offs, (nq,).
@@ -72,7 +79,7 @@ def plan_retreat(
         ways.append(
             Retreat(frozen(q), bases, float(gaps[end]), wanted, float(gaps[: end + 1].min()))
         )
-    return min(ways, key=lambda way: (-min(way.clearance, wanted), len(way.bases)))
+    return tuple(sorted(ways, key=lambda way: (-min(way.clearance, wanted), len(way.bases))))
 
 
 def _end(gaps: Array, wanted: float) -> int:

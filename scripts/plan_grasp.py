@@ -23,6 +23,7 @@ import json
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,7 +31,9 @@ import numpy as np
 import pinocchio as pin
 import tyro
 from grasp_ending import Ending, ending, ending_record, grip_of, print_ending
-from grasp_report import episode_of, print_round, raw_touches
+from grasp_moves import act_motions, from_home, left_at
+from grasp_report import belief_record, episode_of, print_round, raw_touches
+from obstacle_file import read_obstacles
 from output_files import require_writable, write_whole
 from rich.console import Console
 from worlds import build_world, pose_in, print_object, sensor_in
@@ -39,7 +42,6 @@ from estimator.axis import angle_between, offset_at
 from estimator.belief import Belief
 from estimator.contact import Contact, Miss, SensorNoise
 from estimator.readers.raw_files import write_raw
-from estimator.records import estimate_record
 from estimator.sensors import sensor_noise
 from estimator.surface import SurfaceOfRevolution
 from hand_models import HandError, load_hand
@@ -47,7 +49,7 @@ from hand_models.hand import Hand
 from planner.explore import Step, explore
 from planner.goal import Goal
 from planner.grasp import Friction, GraspOptions
-from planner.messages import plan_document, step_record
+from planner.messages import plan_document
 from planner.options import PlannerOptions
 from planner.plan import NoPlan, Probe
 from planner.workspace import Workspace
@@ -88,6 +90,8 @@ class Options:
     Not given, the arm reaches everywhere."""
     wrist_range_mm: float = 150.0
     """How far from there, along each axis, the arm can go; it turns the hand any way."""
+    obstacles: Path | None = None
+    """A TOML file of a table and boxes that the hand must not meet (scripts/obstacle_file.py)."""
     budget: int = 15
     """Largest number of touches."""
     grasp_heights_mm: tuple[float, float] | None = None
@@ -164,21 +168,21 @@ def _scenario(options: Options) -> Scenario:
         world=build_world(options.world, hand, surface, options.sensor, rng),
         hand=hand,
         goal=Goal(np.deg2rad(options.goal_angle_deg), 1e-3 * options.goal_offset_mm),
-        planner=_planner_options(options),
+        planner=from_home(hand, _planner_options(options)),
         grasp=_grasp_options(options),
     )
 
 
 def _planner_options(options: Options) -> PlannerOptions:
-    """The planner's defaults, within the arm's workspace."""
+    """The planner's defaults, within the arm's workspace, among the obstacles."""
+    reach = replace(PlannerOptions().reach, **read_obstacles(options.obstacles))
     if options.wrist_mm is None:
-        return PlannerOptions()
+        return PlannerOptions(reach=reach)
     if not np.all(np.isfinite(options.wrist_mm)):
         raise ValueError(f"--wrist-mm: expected three finite numbers, got {options.wrist_mm}")
     X_WB = pin.SE3(np.eye(3), 1e-3 * np.array(options.wrist_mm))
     workspace = Workspace(X_WB, 1e-3 * options.wrist_range_mm, np.pi)
-    reach = replace(PlannerOptions().reach, workspace=workspace)
-    return PlannerOptions(reach=reach)
+    return PlannerOptions(reach=replace(reach, workspace=workspace))
 
 
 def _grasp_options(options: Options) -> GraspOptions:
@@ -188,10 +192,10 @@ def _grasp_options(options: Options) -> GraspOptions:
         raise ValueError(f"--grasp-heights-mm: expected low < high, got {heights}")
     if not (np.isfinite(options.friction) and options.friction > 0.0):
         raise ValueError(f"--friction: expected a number > 0, got {options.friction}")
-    default = GraspOptions()
+    default, told = GraspOptions(), _planner_options(options).reach
     return replace(
         default,
-        reach=replace(default.reach, workspace=_planner_options(options).reach.workspace),
+        reach=replace(default.reach, workspace=told.workspace, table=told.table, boxes=told.boxes),
         heights=None if heights is None else (1e-3 * heights[0], 1e-3 * heights[1]),
         friction=Friction(options.friction),
     )
@@ -229,7 +233,8 @@ def _conclude(
     unconfirmed = steps[-1].surprise if steps else None
     met = scenario.goal.met_by(belief) and unconfirmed is None
     surface = scenario.world.surface
-    truth, middle = surface.axis, _middle(surface)
+    truth = surface.axis
+    middle = truth.point + np.mean(surface.profile.z_range) * truth.direction
     error = {
         "angle_deg": float(np.rad2deg(angle_between(belief.axis, truth))),
         "offset_mm": 1e3 * offset_at(belief.axis, truth, middle),
@@ -240,19 +245,16 @@ def _conclude(
     )
     missing = scenario.goal.missing(belief) or unconfirmed
     reason = "" if met else reason or f"budget spent: {missing}"
-    rng = np.random.default_rng([options.seed, 2])
-    end = Ending()
+    rng, end = np.random.default_rng([options.seed, 2]), Ending()
     if met:
         with console.status("planning the grasp ..."):
-            end = ending(scenario.hand, belief, surface, scenario.grasp, rng=rng)
+            grasp = replace(scenario.grasp, start=left_at(steps, scenario.planner.start))
+            end = ending(scenario.hand, belief, surface, grasp, rng=rng)
         print_ending(console, end)
     result = {
         "goal_met": met,
         "reason": reason,
-        "verdict": belief.estimate.verdict if belief.estimate else "undetermined",
-        "touches": steps[-1].touches if steps else 0,
-        "estimate": estimate_record(belief.estimate) if belief.estimate else None,
-        "covariance": belief.covariance.tolist(),
+        **belief_record(belief, steps),
         "truth": {
             "axis": {"point": truth.point.tolist(), "direction": truth.direction.tolist()},
             "object": options.object,
@@ -260,7 +262,6 @@ def _conclude(
         },
         "error": error,
         "goal": {"angle_deg": options.goal_angle_deg, "offset_mm": options.goal_offset_mm},
-        "rounds": [step_record(step) for step in steps],
         "grasp": ending_record(end),
     }
     document = plan_document(scenario.hand, [step.plan for step in steps], end.grasp)
@@ -273,6 +274,7 @@ def _conclude(
             episode = episode_of(
                 surface, scenario.world, steps, words, options.sensor,
                 grip_of(scenario.hand, end),
+                partial(act_motions, scenario.hand, scenario.planner.limits),
             )  # fmt: skip
             write_page(options.out / "probes.html", scenario.hand, episode)
         write_whole(options.out / "plan.json", f"{plans}\n".encode())
@@ -290,10 +292,6 @@ def _conclude(
         return 0
     console.print(f"[bold red]Goal not met[/]: {reason}")
     return 1
-
-
-def _middle(surface: SurfaceOfRevolution) -> np.ndarray:
-    return surface.axis.point + np.mean(surface.profile.z_range) * surface.axis.direction
 
 
 if __name__ == "__main__":

@@ -116,7 +116,7 @@ def build_scene(hand: Hand, episode: Episode) -> Scene:
             _shown(f"/belief/{i}/after", beat.touch, end),
             _shown(f"/touched/{i}", beat.touch),
         ]
-    camera = _camera(episode, frames)
+    camera = _camera(episode)
     return Scene(tuple(stage), tuple(tracks), beats, duration, camera)
 
 
@@ -216,9 +216,9 @@ def _room() -> Iterator[Command]:
     yield set_property("/Background", "bottom_color", [0.80, 0.84, 0.89])
 
 
-def _camera(episode: Episode, frames: tuple[Posture, ...]) -> Camera:
+def _camera(episode: Episode) -> Camera:
     """Beside the line from the object to the hand, raised, on the side that is touched."""
-    hand = np.mean([frame.X_WB.translation for frame in frames], axis=0) - episode.centre
+    hand = np.mean([act.bases[0].translation for act in episode.acts], axis=0) - episode.centre
     side = np.cross([0.0, 0.0, 1.0], hand)
     side = unit(side) if np.linalg.norm(side) > 0.02 else np.array([0.0, -1.0, 0.0])
     touched = np.mean([_place(act) for act in episode.acts], axis=0) - episode.centre
@@ -226,7 +226,8 @@ def _camera(episode: Episode, frames: tuple[Posture, ...]) -> Camera:
     away = unit(side + 0.3 * unit(hand) + np.array([0.0, 0.0, 0.4]))
     # a little below the middle: the caption covers the bottom of the picture
     target = episode.centre + 0.3 * hand - np.array([0.0, 0.0, 0.04])
-    distance = episode.half_height + 0.40
+    comes = any(act.motion is not None for act in episode.acts)  # from farther away
+    distance = episode.half_height + (0.52 if comes else 0.40)
     return Camera(frozen(target + distance * away), frozen(target))
 
 
