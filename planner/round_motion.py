@@ -163,14 +163,13 @@ def _outer(
     movable: Movable, way: Retreat, start: Configuration | None
 ) -> tuple[Transfer, Trajectory | None, list[MotionCertificate]] | str:
     """The way to the object and the way out, certified."""
-    q = np.repeat(way.q[None], len(way.bases), axis=0)
-    leave = timed(movable.hand, "leave", q, way.bases, movable.limits)
+    leave = timed(movable.hand, "leave", way.path, way.bases, movable.limits)
     found = [] if leave is None else [movable.certify(leave)]
     if found and found[0].faults:
         return f"on the way out, {found[0].faults[0]}"
     if start is None:
         return Transfer(None, None), leave, found
-    outside = Configuration(way.q, way.bases[-1])
+    outside = Configuration(way.path[-1], way.bases[-1])
     transfer = plan_transfer(movable, start, outside, wanted=way.wanted)
     if isinstance(transfer, str):
         return f"on the way to the object, {transfer}"

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 ROOM = 0.25  # of the base about begin and end [m]
 _RESOLUTION = 0.02  # between checked configurations [m], a turn of the base as on a 0.1 m arm
 _JOINT_WEIGHT = 0.05  # of a joint's angle beside the base's way [m/rad]
+_ARM_WEIGHT = 0.3  # the same for the joints of arm and hand [m/rad]
 _TURN_WEIGHT = 0.1  # of the base's turn [m/rad]
 _REDUCE = (30, 15, 1.0)  # attempts to leave corners out, in vain in a row, share of the path
 _SHORTEN = (40, 20, 1.0)  # likewise, between any two places
@@ -35,12 +36,13 @@ def sampled_path(
     util.setLogLevel(util.LogLevel.LOG_NONE)
     util.RNG.setSeed(1 + movable.seed)
     space, dof = _space(movable, begin, end), movable.hand.model.nq
+    held = None if movable.hand.arm is None else begin.X_WB  # an arm's root stands still
     count = 0
 
     def is_valid(state: Any) -> bool:
         nonlocal count
         count += 1
-        place = _configuration(state, dof)
+        place = _configuration(state, dof, held)
         R, p = place.X_WB.rotation[None], place.X_WB.translation[None]
         if not movable.workspace.allows(R, p)[0]:
             return False
@@ -59,7 +61,7 @@ def sampled_path(
     shorten = geometric.PathSimplifier(info)
     shorten.reduceVertices(path, *_REDUCE)
     shorten.partialShortcutPath(path, *_SHORTEN)
-    return [_configuration(path.getState(i), dof) for i in range(path.getStateCount())]
+    return [_configuration(path.getState(i), dof, held) for i in range(path.getStateCount())]
 
 
 def _space(movable: Movable, begin: Configuration, end: Configuration) -> Any:
@@ -72,7 +74,7 @@ def _space(movable: Movable, begin: Configuration, end: Configuration) -> Any:
     space = base.CompoundStateSpace()
     space.addSubspace(place, 1.0)
     space.addSubspace(base.SO3StateSpace(), 2.0 * _TURN_WEIGHT)  # its distance is half the turn
-    space.addSubspace(joints, _JOINT_WEIGHT)
+    space.addSubspace(joints, _JOINT_WEIGHT if movable.hand.arm is None else _ARM_WEIGHT)
     space.setLongestValidSegmentFraction(_RESOLUTION / space.getMaximumExtent())
     space.setup()
     return space
@@ -93,8 +95,10 @@ def _state(space: Any, place: Configuration) -> Any:
     return state
 
 
-def _configuration(state: Any, dof: int) -> Configuration:
+def _configuration(state: Any, dof: int, held: pin.SE3 | None) -> Configuration:
     p, turn, q = state[0], state[1], state[2]
-    R = pin.Quaternion(turn.w, turn.x, turn.y, turn.z).matrix()
     joints = np.array([q[i] for i in range(dof)])
+    if held is not None:
+        return Configuration(joints, held)
+    R = pin.Quaternion(turn.w, turn.x, turn.y, turn.z).matrix()
     return Configuration(joints, pin.SE3(R, np.array([p[0], p[1], p[2]])))

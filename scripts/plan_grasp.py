@@ -19,7 +19,6 @@ Examples:
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -30,11 +29,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 import tyro
+from describe_hand import Options as DescribeOptions
+from describe_hand import describe
 from grasp_ending import Ending, ending, ending_record, grip_of, print_ending
 from grasp_moves import act_motions, from_home, left_at
 from grasp_report import belief_record, episode_of, print_round, raw_touches
 from obstacle_file import read_obstacles
-from output_files import require_writable, write_whole
+from output_files import require_writable, write_json
 from rich.console import Console
 from worlds import build_world, pose_in, print_object, sensor_in
 
@@ -67,7 +68,9 @@ class Options:
     """Command line of plan_grasp.py."""
 
     hand: str = "allegro_right"
-    """Hand: allegro_right, allegro_left, or the path of a description (.toml)."""
+    """Hand: one of hand_models/hands, or the path of a description (.toml)."""
+    describe_hand: Path | None = None
+    """Instead of all this, propose a description of the hand in this URDF or MJCF, into --out."""
     object: str = "can"
     """What is touched: a built-in name (can, bottle, cone, cup, barrel, jar-lid, knob, vase, egg,
     spindle, paper-lathe, sphere), a CSV file (r_mm,z_mm), a product's JSON or a mesh (stl, obj)."""
@@ -75,8 +78,7 @@ class Options:
     """Tactile sensor. Readings with noise: ideal, fearing1988, robotworld, taxel, gel, gel-good,
     gel-poor. Raw signals, simulated and read: fearing-strain, gel-depth, taxel-array."""
     world: str = "own"
-    """Where the touches happen: own, or MuJoCo with the object held (mujoco) or standing free on a
-    table (mujoco-table); pads are then domes of gel, --sensor gel-depth."""
+    """own, or MuJoCo with gel-depth pads, the object held (mujoco) or on a table (mujoco-table)."""
     prior_angle_deg: float = 15.0
     """How far the camera's axis is off in direction."""
     prior_offset_mm: float = 15.0
@@ -121,6 +123,8 @@ class Scenario:
 
 def main() -> int:
     options = tyro.cli(Options, description=__doc__)
+    if options.describe_hand is not None:
+        return describe(DescribeOptions(options.describe_hand, out=options.out))
     console = Console()
     try:
         options = replace(options, sensor=sensor_in(options.world, options.sensor))
@@ -264,9 +268,7 @@ def _conclude(
         "goal": {"angle_deg": options.goal_angle_deg, "offset_mm": options.goal_offset_mm},
         "grasp": ending_record(end),
     }
-    document = plan_document(scenario.hand, [step.plan for step in steps], end.grasp)
-    plans = json.dumps(document, indent=1, allow_nan=False)
-    told = json.dumps(result, indent=1, allow_nan=False)
+    plans = plan_document(scenario.hand, [step.plan for step in steps], end.grasp)
     try:
         options.out.mkdir(parents=True, exist_ok=True)
         if steps:
@@ -277,8 +279,8 @@ def _conclude(
                 partial(act_motions, scenario.hand, scenario.planner.limits),
             )  # fmt: skip
             write_page(options.out / "probes.html", scenario.hand, episode)
-        write_whole(options.out / "plan.json", f"{plans}\n".encode())
-        write_whole(options.out / "result.json", f"{told}\n".encode())
+        write_json(options.out / "plan.json", plans)
+        write_json(options.out / "result.json", result)
         raw = raw_touches(options.sensor, steps, scenario.world)
         if raw is not None:
             write_raw(options.out / "raw.npz", raw)

@@ -14,11 +14,13 @@ import pinocchio as pin
 from estimator.vectors import Array
 from hand_models.geometry import link_points, pad_in_joint
 from hand_models.hand import Hand
+from hand_models.joints import joint_motion, joint_motions
 
 BASE = "base"
 ARMATURE = 2e-3  # of the gears [kg m^2] or [kg]
 STIFFNESS = {True: 20.0, False: 2e4}  # of actuators: turning [Nm/rad], sliding [N/m]
 DAMPING = {True: 1.0, False: 300.0}
+STIFF_RATE = 50.0  # ... and this much faster for what a joint carries [1/s]
 PAD_STIFFNESS, PAD_SOLIMP = 65.0, (0.5, 0.5, 1e-3, 0.5, 2.0)  # [1/s^2]: 0.5 N press it by 1.4 mm
 FINGER_MASS = 0.18  # that a pad feels of its finger [kg]
 _LIGHTEST = 1e-3  # link [kg]
@@ -68,6 +70,11 @@ def place_base(data: mujoco.MjData, X_WB: pin.SE3) -> None:
     mujoco.mju_mat2Quat(data.mocap_quat[0], np.ascontiguousarray(X_WB.rotation).ravel())
 
 
+def joint_targets(hand: Hand, q: Array) -> Array:
+    """Positions of all joints in the order of the actuators, (..., joints), for q (..., nq)."""
+    return np.stack([motion.at(q) for motion in joint_motions(hand.model)], axis=-1)
+
+
 def _add_joint(
     spec: mujoco.MjSpec, parent: mujoco.MjsBody, model: pin.Model, j: int
 ) -> mujoco.MjsBody:
@@ -77,26 +84,30 @@ def _add_joint(
     body.mass, body.ipos = max(float(inertia.mass), _LIGHTEST), np.array(inertia.lever)
     about = np.asarray(inertia.inertia) + 1e-7 * np.eye(3)
     body.fullinertia = about[(0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)]
-    axis, turns = _motion(model, j)
-    k = model.joints[j].idx_q
+    motion = joint_motion(model.joints[j])
+    turns = bool(np.linalg.norm(motion.angular) > 0.5)
     kind = mujoco.mjtJoint.mjJNT_HINGE if turns else mujoco.mjtJoint.mjJNT_SLIDE
-    low, high = float(model.lowerPositionLimit[k]), float(model.upperPositionLimit[k])
+    ends = motion.at(np.array([model.lowerPositionLimit, model.upperPositionLimit]))
     body.add_joint(
-        name=name, type=kind, axis=axis, armature=ARMATURE, range=[low, high],
-        limited=mujoco.mjtLimited.mjLIMITED_TRUE,
+        name=name, type=kind, axis=motion.angular if turns else motion.linear, armature=ARMATURE,
+        range=np.sort(ends), limited=mujoco.mjtLimited.mjLIMITED_TRUE,
     )  # fmt: skip
+    carried = _carried(model, j, np.concatenate([motion.linear, motion.angular]))
     actuator = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
-    actuator.set_to_position(kp=STIFFNESS[turns], kv=DAMPING[turns])
+    actuator.set_to_position(
+        kp=STIFFNESS[turns] + STIFF_RATE**2 * carried,
+        kv=DAMPING[turns] + 2.0 * STIFF_RATE * carried,
+    )
     return body
 
 
-def _motion(model: pin.Model, j: int) -> tuple[Array, bool]:
-    """A joint's axis in its own frame, and whether it turns about it."""
+def _carried(model: pin.Model, j: int, twist: Array) -> float:
+    """What a joint has to move, stretched out [kg m^2] or [kg]: an arm is stiffer than a finger."""
     data = model.createData()
-    J = pin.computeJointJacobian(model, data, pin.neutral(model), j)
-    twist = np.asarray(J[:, model.joints[j].idx_v])
-    turns = bool(np.linalg.norm(twist[3:]) > 0.5)
-    return (twist[3:] if turns else twist[:3]), turns
+    pin.forwardKinematics(model, data, pin.neutral(model))
+    below = [k for k in range(j, model.njoints) if j in list(model.supports[k])]
+    moved = (data.oMi[j].actInv(data.oMi[k]).act(model.inertias[k]).matrix() for k in below)
+    return float(twist @ np.sum(list(moved), axis=0) @ twist)
 
 
 def _add_links(spec: mujoco.MjSpec, hand: Hand, bodies: list[mujoco.MjsBody]) -> None:

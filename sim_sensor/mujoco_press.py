@@ -12,7 +12,7 @@ import pinocchio as pin
 
 from estimator.vectors import Array, frozen, unit
 from hand_models.hand import Hand
-from sim_sensor.mujoco_hand import link_name, pad_name, place_base
+from sim_sensor.mujoco_hand import joint_targets, link_name, pad_name, place_base
 from sim_sensor.mujoco_object import OBJECT, TABLE
 
 SPEED, BACK = 0.03, 0.15  # of the pad on its way and back [m/s]
@@ -93,7 +93,7 @@ class _Pad:
 def press(model: mujoco.MjModel, data: mujoco.MjData, hand: Hand, way: Touching) -> Press:
     """Carry an approach out; afterwards the hand is back at its start."""
     pad, lead = pad_name(way.finger), _start(model, data, hand, way)
-    route = list(_ticks(model, way, lead))
+    route = list(_ticks(model, way, joint_targets(hand, way.path), lead))
     at, met, bumped = -1, None, frozenset[str]()
     felt = _Pad(0.0, None, bumped)
     while at < len(route) - 1 and felt.force < way.force_goal:
@@ -127,10 +127,10 @@ def _settle(
 
 def _start(model: mujoco.MjModel, data: mujoco.MjData, hand: Hand, way: Touching) -> Array:
     """Set the hand to the path's start; how far back its pad had to go to be free, (3,)."""
-    for name, angle in zip(hand.joint_names, way.path[0], strict=True):
-        joint = data.joint(name)
+    data.ctrl[:] = joint_targets(hand, way.path[0])
+    for actuator, angle in enumerate(data.ctrl):
+        joint = data.joint(model.actuator(actuator).name)
         joint.qpos[:], joint.qvel[:] = angle, 0.0
-    data.ctrl[:] = way.path[0]
     steps = np.diff(way.tip_centres, axis=0)
     forward = unit(steps[np.argmax(np.linalg.norm(steps, axis=1) > 1e-6)])
     lead = np.zeros(3)
@@ -143,22 +143,22 @@ def _start(model: mujoco.MjModel, data: mujoco.MjData, hand: Hand, way: Touching
         lead = lead - _BACK_OFF * forward
 
 
-def _ticks(model: mujoco.MjModel, way: Touching, lead: Array) -> Iterator[_Tick]:
+def _ticks(model: mujoco.MjModel, way: Touching, path: Array, lead: Array) -> Iterator[_Tick]:
     """The way at constant speed."""
     tick = SPEED * model.opt.timestep
     first = way.bases[0]
     for s in np.arange(np.linalg.norm(lead), 0.0, -tick):
-        yield _Tick(0.0, way.path[0], pin.SE3(first.rotation, first.translation + s * unit(lead)))
+        yield _Tick(0.0, path[0], pin.SE3(first.rotation, first.translation + s * unit(lead)))
     lengths = np.linalg.norm(np.diff(way.tip_centres, axis=0), axis=1)
     for k, length in enumerate(lengths):
         count = max(1, int(np.ceil(length / tick)))
         for s in np.arange(count) / count:
-            yield _Tick(k + s, *_between(way, k, s))
-    yield _Tick(float(len(lengths)), way.path[-1], way.bases[-1])
+            yield _Tick(k + s, *_between(way, path, k, s))
+    yield _Tick(float(len(lengths)), path[-1], way.bases[-1])
 
 
-def _between(way: Touching, k: int, s: float) -> tuple[Array, pin.SE3]:
-    q = (1.0 - s) * way.path[k] + s * way.path[k + 1]
+def _between(way: Touching, path: Array, k: int, s: float) -> tuple[Array, pin.SE3]:
+    q = (1.0 - s) * path[k] + s * path[k + 1]
     if len(way.bases) == 1:
         return q, way.bases[0]
     return q, pin.SE3.Interpolate(way.bases[k], way.bases[k + 1], s)

@@ -37,6 +37,7 @@ from sim_sensor.solid import Solid
 from sim_sensor.world import TouchRecord
 
 SENSOR = "gel-depth"
+_REST = 0.5  # after a push [s]
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,6 +119,20 @@ class MujocoWorld:
         moved = float(np.linalg.norm(self._data.body(OBJECT).xpos - before))
         self._records.append(replace(record, moved=moved))
         return record.outcome
+
+    def push(self, force_W: Array, *, seconds: float) -> None:
+        """Somebody bumps the object: a force [N] on its middle for a time; then it comes to rest.
+
+        Raises:
+            ValueError: The object is held.
+        """
+        model, data = self._models.moving, self._data
+        body = data.body(OBJECT)
+        if not model.body(OBJECT).jntnum[0]:
+            raise ValueError("push: the object is held; let it stand")
+        for k in range(int((seconds + _REST) / model.opt.timestep)):
+            body.xfrc_applied[:3] = force_W if k * model.opt.timestep < seconds else 0.0
+            mujoco.mj_step(model, data)
 
     def _record(self, path: Touching, pressed: Press, axis: Array | None) -> MujocoRecord:
         finger = self._hand.finger(path.finger)
