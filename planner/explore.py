@@ -25,6 +25,7 @@ from planner.options import PlannerOptions
 from planner.plan import NoPlan, Plan, Probe, plan_probes
 from planner.risk import MISSED
 from planner.surprise import Learnt, learn
+from planner.trajectory import Configuration
 
 UNLIKELY = 0.5  # chance of a miss from which a placement is not worth its three touches
 TELLING_TRIES = 6  # best single touches that are handed to the optimiser
@@ -87,7 +88,15 @@ def explore(
         outcomes = tuple(touch(probe) for probe in plan.probes)
         touches += len(outcomes)
         learnt = learn(learnt, outcomes)
+        options = _moved(options, plan)
         yield Step(plan, outcomes, before, learnt.belief, touches, learnt.surprise)
+
+
+def _moved(options: PlannerOptions, plan: Plan) -> PlannerOptions:
+    """The options for the next placement: the hand is where the last left it."""
+    if plan.motion is None:
+        return options
+    return replace(options, start=Configuration(plan.retreat.path[-1], plan.retreat.bases[-1]))
 
 
 def _plan(

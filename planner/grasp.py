@@ -12,7 +12,7 @@ from estimator.profile import Profile
 from estimator.surface import SurfaceOfRevolution
 from estimator.vectors import Array, frozen
 from hand_models.hand import Hand
-from planner.candidates import Candidates, placement_candidates
+from planner.candidates import Candidates
 from planner.closing import Bodies, bodies_of, body_of
 from planner.funnel import Funnel
 from planner.grasp_hold import CLOSED, Closings, Friction, holds
@@ -25,16 +25,17 @@ from planner.grasp_motion import (
 )
 from planner.grasp_options import GraspOptions
 from planner.grasp_outcome import Grasp, Hold, NoGrasp, closes_on, hold_on
+from planner.grasp_travel import GraspMotion, plan_grasp_motion
 from planner.hand_tools import HandTools, hand_tools
 from planner.motion import Approach, plan_approaches
 from planner.reach import Reach, Unreachable
 from planner.reach_task import ReachOptions
-from planner.solid import RevolvedSolid
+from planner.retreat import wall_95
+from planner.solid import RevolvedSolid, believed_solid
 from planner.starts import Start
+from planner.transfer import movable_among
 
 __all__ = ["Friction", "Grasp", "GraspOptions", "Hold", "NoGrasp", "closes_on", "plan_grasp"]
-
-_HEIGHTS = 101  # of the believed object as an obstacle
 
 
 def plan_grasp(
@@ -59,10 +60,10 @@ def plan_grasp(
     tools = hand_tools(hand, options.reach)
     bodies = bodies_of(sample_objects(belief, options.objects, rng=rng))
     ranked, funnel = _ranked(tools, belief.surface, bodies, options, rng)
-    solid = _solid(belief.surface)
+    solid = believed_solid(belief.surface)
     failures: dict[str, int] = {}
     for one in ranked[: options.tries]:
-        made = _made(tools, solid, one, options)
+        made = _made(tools, belief, solid, one, options)
         if isinstance(made, _Made):
             funnel += tuple((f"out of reach: {reason}", n) for reason, n in failures.items())
             fresh = bodies_of(sample_objects(belief, options.stated, rng=rng))
@@ -89,6 +90,7 @@ class _Made:
     approaches: tuple[Approach, ...]
     path: Array
     bases: tuple[pin.SE3, ...]
+    motion: GraspMotion | None
 
 
 @dataclass(frozen=True)
@@ -129,13 +131,8 @@ def _with_fingers(
 ) -> tuple[list[_Ranked], Funnel]:
     if count > len(tools.hand.fingers):
         raise ValueError(f"fingers: {tools.hand.name} has {len(tools.hand.fingers)}, not {count}")
-    laid = placement_candidates(
-        tools.reach_map,
-        _bounded(surface, options.heights),
-        workspace=options.reach.workspace,
-        count=options.placements,
-        rng=rng,
-        fingers_at_once=count,
+    laid = tools.candidates(
+        _bounded(surface, options.heights), count, count=options.placements, rng=rng
     )
     if len(laid) == 0:
         return [], laid.rejected
@@ -186,15 +183,8 @@ def _start(hand: Hand, laid: Candidates, i: int) -> Start:
     return Start(tuple(hand.fingers[k].name for k in laid.fingers[i]), laid.q[i], laid.base(i))
 
 
-def _solid(surface: SurfaceOfRevolution) -> RevolvedSolid:
-    """The believed object as an obstacle."""
-    z = np.linspace(*surface.profile.z_range, _HEIGHTS)
-    X_WO = pin.SE3(np.ascontiguousarray(surface.frame.T), np.array(surface.axis.point))
-    return RevolvedSolid(X_WO, z, surface.profile.derivatives(z)[0])
-
-
 def _made(
-    tools: HandTools, solid: RevolvedSolid, one: _Ranked, options: GraspOptions
+    tools: HandTools, belief: Belief, solid: RevolvedSolid, one: _Ranked, options: GraspOptions
 ) -> _Made | str:
     """The candidate made exact, or the reason why it cannot be."""
     reach = tools.solver.solve(
@@ -215,7 +205,15 @@ def _made(
         tools.hand, tools.collision, tools.spheres, reach, solid, options.reach,
         length=options.way_in,
     )  # fmt: skip
-    return "no way in for the open hand" if bases is None else _Made(reach, approaches, path, bases)
+    if bases is None:
+        return "no way in for the open hand"
+    if options.start is None:
+        return _Made(reach, approaches, path, bases, None)
+    movable = movable_among(tools.hand, tools.collision, solid, options.reach, options.limits)
+    motion = plan_grasp_motion(
+        movable, reach, bases, path, BEFORE, options.start, wanted=wall_95(belief)
+    )
+    return motion if isinstance(motion, str) else _Made(reach, approaches, path, bases, motion)
 
 
 def _grasp(
@@ -255,4 +253,5 @@ def _grasp(
         as_believed=hold_on(reach.fingers, closings, surface, friction),
         reach=reach,
         funnel=funnel,
+        motion=made.motion,
     )

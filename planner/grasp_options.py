@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 
 from planner.grasp_hold import Friction
 from planner.reach_task import ReachOptions
+from planner.timing import MotionLimits
+from planner.trajectory import Configuration
 
 _GRASP_REACH = ReachOptions(
     starts=0, rescues=0, least_standoff=0.012, least_overshoot=0.008, overshoot=0.020,
@@ -30,6 +32,8 @@ class GraspOptions:
         stated: Drawn afresh for the probability and margins that are stated.
         tries: How many of the best are handed to the optimiser.
         way_in: Length of the hand's straight way to the pre-grasp [m].
+        start: Where the hand is; motions are planned from there. None plans no motions.
+        limits: Of speed and acceleration.
     Raises:
         ValueError: Names the option.
     """
@@ -44,6 +48,8 @@ class GraspOptions:
     stated: int = 128
     tries: int = 24
     way_in: float = 0.12
+    start: Configuration | None = None
+    limits: MotionLimits = field(default_factory=MotionLimits)
 
     def __post_init__(self) -> None:
         if not self.fingers or any(count < 2 for count in self.fingers):

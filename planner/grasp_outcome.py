@@ -12,6 +12,7 @@ from estimator.vectors import Array
 from planner.closing import body_of
 from planner.funnel import Funnel, in_words
 from planner.grasp_hold import Closings, Friction, holds
+from planner.grasp_travel import GraspMotion
 from planner.reach import Reach
 
 
@@ -62,6 +63,7 @@ class Grasp:
         as_believed: What the grasp makes of the best guess.
         reach: Joint angles and contacts, certified.
         funnel: How many candidates there were, and what refused the others.
+        motion: All that the hand does, in time; None where it was not told where the hand is.
     """
 
     fingers: tuple[str, ...]
@@ -81,6 +83,7 @@ class Grasp:
     as_believed: Hold
     reach: Reach
     funnel: Funnel
+    motion: GraspMotion | None = None
 
     @property
     def points(self) -> Array:

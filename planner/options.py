@@ -11,6 +11,8 @@ from planner.choice import MARGIN
 from planner.criteria import Criterion
 from planner.motion import FORCE_GOAL
 from planner.reach_task import ReachOptions
+from planner.timing import MotionLimits
+from planner.trajectory import Configuration
 
 OFFSET_GUARD = float(np.deg2rad(5.0))
 
@@ -35,6 +37,9 @@ class PlannerOptions:
             (`planner.sweep`); criterion `information` only.
         certify: Whether a plan says how good it is among all touches that there are.
         force_goal: At which a touching finger stops [N].
+        start: Where the hand is; motions are planned from there (`planner.round_motion`), and a
+            placement that none leads to is refused. None plans no motions.
+        limits: Of speed and acceleration.
     """
 
     reach: ReachOptions = field(default_factory=lambda: ReachOptions(starts=0, rescues=1))
@@ -49,6 +54,8 @@ class PlannerOptions:
     sweep: bool = False
     certify: bool = True
     force_goal: float = FORCE_GOAL
+    start: Configuration | None = None
+    limits: MotionLimits = field(default_factory=MotionLimits)
 
     def __post_init__(self) -> None:
         if self.fingers_at_once not in (1, 2, 3):

@@ -14,6 +14,7 @@ from planner.optimum import ChoiceCertificate
 from planner.reach import Reach
 from planner.retreat import Retreat
 from planner.risk import Risk
+from planner.round_motion import RoundMotion
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +53,7 @@ class Plan:
         retreat: The hand's way out after the probes.
         risks: What is at least 5 % likely to leave the axis untold, the likeliest first.
         choice: How good these touches are among all that there are; None where not asked.
+        motion: All that the hand does, in time; None where it was not told where the hand is.
     """
 
     probes: tuple[Probe, ...]
@@ -67,6 +69,7 @@ class Plan:
     retreat: Retreat
     risks: tuple[Risk, ...] = ()
     choice: ChoiceCertificate | None = None
+    motion: RoundMotion | None = None
 
     def chance_of(self, name: str) -> float:
         """Of one of the risks (`planner.risk` names them); 0 where it is not worth saying."""

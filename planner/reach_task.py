@@ -15,6 +15,7 @@ from planner.reach_kinematics import LENGTH
 from planner.reach_model import ReachModel, pack_parameters
 from planner.solid import RevolvedSolid
 from planner.starts import Start
+from planner.surroundings import Box
 from planner.workspace import Workspace
 
 Array = NDArray[np.float64]
@@ -40,6 +41,7 @@ class ReachOptions:
         clearance: Between object and links that do not touch [m].
         self_clearance: Between links [m].
         table: (a, b, c, h): half-space a x + b y + c z >= h the hand must stay in; None for none.
+        boxes: Obstacles that a motion must not meet.
         standoff: How far before the contact the fingers retreat, if they can [m].
         least_standoff: How far they must [m].
         overshoot: How far behind the contact they can press on, if they can [m].
@@ -56,6 +58,7 @@ class ReachOptions:
     clearance: float = 1e-3
     self_clearance: float = 0.0
     table: tuple[float, float, float, float] | None = None
+    boxes: tuple[Box, ...] = ()
     standoff: float = 0.030
     least_standoff: float = 0.020
     overshoot: float = 0.025
@@ -168,6 +171,7 @@ def _parameters(
         retreat=task.retreat,
         table=np.array(_NO_TABLE if options.table is None else options.table),
         solid=task.solid,
+        q_start=start.q,
     )
 
 

@@ -29,14 +29,16 @@ class Retreat:
     """How the hand leaves an object it touched.
 
     Args:
-        q: Joint positions throughout: the fingers at their stand-offs [rad].
-        bases: Poses of the hand base, from the stand-off on (`X_WB`).
+        q: Joint positions at the beginning: the fingers at their stand-offs [rad].
+        path: Joint positions on the way, (K, nq): q throughout, unless an arm moves the hand [rad].
+        bases: K poses of the hand base, from the stand-off on (`X_WB`).
         clearance: Least distance of hand and believed object at the end [m].
         wanted: How far off the object's wall may be, with 95 % probability [m].
         nearest: Least distance on the way [m].
     """
 
     q: Array
+    path: Array
     bases: tuple[pin.SE3, ...]
     clearance: float
     wanted: float
@@ -51,7 +53,14 @@ class Retreat:
 def plan_retreat(
     hand: Hand, spheres: LinkSpheres, belief: Belief, q: Array, X_WB: pin.SE3, normals: Array
 ) -> Retreat:
-    """The shortest straight way out of the base; the clearest where none ends clear.
+    """The first of the ways out."""
+    return ways_out(hand, spheres, belief, q, X_WB, normals)[0]
+
+
+def ways_out(
+    hand: Hand, spheres: LinkSpheres, belief: Belief, q: Array, X_WB: pin.SE3, normals: Array
+) -> tuple[Retreat, ...]:
+    """Straight ways out of the base: those that end clear, the shortest first, then the clearest.
 
     Args:
         q: Joints with the fingers at their stand-offs, (nq,).
@@ -69,10 +78,9 @@ def plan_retreat(
         bases = tuple(
             pin.SE3(X_WB.rotation, X_WB.translation + s * direction) for s in way[: end + 1]
         )
-        ways.append(
-            Retreat(frozen(q), bases, float(gaps[end]), wanted, float(gaps[: end + 1].min()))
-        )
-    return min(ways, key=lambda way: (-min(way.clearance, wanted), len(way.bases)))
+        path, nearest = np.repeat(q[None], len(bases), axis=0), float(gaps[: end + 1].min())
+        ways.append(Retreat(frozen(q), frozen(path), bases, float(gaps[end]), wanted, nearest))
+    return tuple(sorted(ways, key=lambda way: (-min(way.clearance, wanted), len(way.bases))))
 
 
 def _end(gaps: Array, wanted: float) -> int:

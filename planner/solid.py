@@ -13,6 +13,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import BSpline, PchipInterpolator
 
+from estimator.surface import SurfaceOfRevolution
 from hand_models.collision import revolved_slices
 
 Array = NDArray[np.float64]
@@ -24,6 +25,7 @@ _DEGREE = 3
 _SPANS = COEFFICIENTS - _DEGREE
 _SLICES = 24  # of the convex decomposition for the final check
 _DENSE = 201  # heights at which the profile is fitted
+_HEIGHTS = 101  # at which a believed profile is read
 _CORNER = 1e-3  # rounding where wall and end meet, so that the distance is smooth [m]
 
 
@@ -98,6 +100,13 @@ class RevolvedSolid:
         spline = BSpline(_knots(), self.coefficients, _DEGREE)
         height = self.z[-1] - self.z[0]
         return self.z[0] + u * height, spline(u), spline(u, 1) / height
+
+
+def believed_solid(surface: SurfaceOfRevolution) -> RevolvedSolid:
+    """A believed object as an obstacle, between the ends of its profile."""
+    z = np.linspace(*surface.profile.z_range, _HEIGHTS)
+    X_WO = pin.SE3(np.ascontiguousarray(surface.frame.T), np.array(surface.axis.point))
+    return RevolvedSolid(X_WO, z, surface.profile.derivatives(z)[0])
 
 
 PARAMETERS = 9 + 3 + 2 + COEFFICIENTS

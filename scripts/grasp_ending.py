@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from grasp_moves import grip_motion
+from grasp_report import motion_in_words
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
@@ -72,6 +74,8 @@ def print_ending(console: Console, end: Ending) -> None:
         f"{grasp.margin_5:.3f} N in 95 % (torques on {1e3 * grasp.friction.torque_length:.0f} mm)\n"
         f"  on the true object: {_in_words(hold)}"
     )
+    if grasp.motion is not None:
+        console.print(f"  {motion_in_words(grasp.motion)}")
 
 
 def grip_of(hand: Hand, end: Ending) -> Grip | None:
@@ -83,10 +87,13 @@ def grip_of(hand: Hand, end: Ending) -> Grip | None:
     stop = np.clip(hold.travel, -before, grasp.closings.behind[0])
     shares = np.linspace(0.0, 1.0, CLOSING)
     closing = [closed_posture(hand, grasp, s * (before + stop) - before) for s in shares]
+    words = f"{', '.join(grasp.fingers)} close around the believed axis\n{_in_words(hold)}"
+    if grasp.motion is not None:
+        return grip_motion(hand, grasp, grasp.motion, np.array(closing), words)
     return Grip(
         np.vstack([np.repeat(grasp.q_pregrasp[None], len(grasp.approach), axis=0), *closing]),
         (*grasp.approach, *[grasp.X_WB] * CLOSING),
-        f"{', '.join(grasp.fingers)} close around the believed axis\n{_in_words(hold)}",
+        words,
     )
 
 

@@ -2,23 +2,37 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
+from worlds import raw_sensor_of
 
-from estimator.belief import update
+from estimator.belief import Belief, update
 from estimator.contact import Contact, Miss
 from estimator.readers.raw_files import RawTouches
 from estimator.readers.raw_sensors import DepthPad, raw_sensor
+from estimator.records import estimate_record
 from estimator.surface import SurfaceOfRevolution
 from planner.explore import Step
+from planner.grasp_travel import GraspMotion
+from planner.messages import step_record
 from planner.plan import Probe
 from planner.risk import risks_in_words
+from planner.round_motion import RoundMotion
 from sim_sensor.episode import Act, BelievedAxis, Episode, Grip
 from sim_sensor.feeling import Felt
+from sim_sensor.moves import ActMotion
 from sim_sensor.pictures import Signal
-from sim_sensor.world import World
+from sim_sensor.world import TouchRecord, World
+
+Motions = Callable[[Step, Sequence[TouchRecord]], Sequence[ActMotion | None]]
+
+if TYPE_CHECKING:
+    from sim_sensor.mujoco_world import MujocoWorld
 
 
 def print_round(console: Console, step: Step, number: int) -> None:
@@ -46,6 +60,8 @@ def print_round(console: Console, step: Step, number: int) -> None:
         console.print(f"  {plan.choice.words}")
     if plan.risks:
         console.print(f"  {risks_in_words(plan.risks)}")
+    if plan.motion is not None:
+        console.print(f"  {motion_in_words(plan.motion)}")
     if step.surprise is not None:
         console.print(f"  [bold yellow]Surprise[/]: {step.surprise}")
     estimate = step.after.estimate
@@ -59,6 +75,18 @@ def print_round(console: Console, step: Step, number: int) -> None:
         if estimate.verdict != "determined":
             for reason in estimate.reasons:
                 console.print(f"    {reason}")
+
+
+def motion_in_words(motion: RoundMotion | GraspMotion) -> str:
+    """How long it takes and how near the hand comes to anything it is not to touch."""
+    found = motion.certificate
+    pair = min(found.nearest.values(), key=lambda pair: pair.distance)
+    seconds = sum(one.duration for one in motion.trajectories)
+    round_it = ", round what is in the way" if motion.sampled else ""
+    return (
+        f"motion of {seconds:.1f} s{round_it}; nearest in {found.waypoints} waypoints: "
+        f"{pair.first} to {pair.second}, {1e3 * pair.distance:.1f} mm"
+    )
 
 
 def _felt(probe: Probe, contact: Contact) -> str:
@@ -80,19 +108,22 @@ def _shown(sensor: str, felt: Felt | None) -> Signal | None:
 
 def episode_of(
     surface: SurfaceOfRevolution,
-    world: World,
+    world: World | MujocoWorld,
     steps: list[Step],
     conclusion: str,
     sensor: str = "",
     grip: Grip | None = None,
+    motions: Motions | None = None,
 ) -> Episode:
     """Each touch with the belief just before and just after it, and the grip at the end."""
     acts: list[Act] = []
     for step in steps:
-        belief = step.before
-        for probe, outcome in zip(step.plan.probes, step.outcomes, strict=True):
+        belief, records = step.before, world.records[len(acts) :][: len(step.outcomes)]
+        paced = [None] * len(records) if motions is None else motions(step, records)
+        for probe, outcome, record, motion in zip(
+            step.plan.probes, step.outcomes, records, paced, strict=True
+        ):
             after = update(belief, [outcome])
-            record = world.records[len(acts)]
             acts.append(
                 Act(
                     finger=probe.finger,
@@ -104,13 +135,25 @@ def episode_of(
                     after=BelievedAxis(after.axis, after.covariance),
                     note="" if record.felt is None else "; ".join(record.felt.flags),
                     signal=_shown(sensor, record.felt),
+                    motion=motion,
                 )
             )
             belief = after
     return Episode(surface, tuple(acts), conclusion=conclusion, grip=grip)
 
 
-def raw_touches(sensor: str, steps: list[Step], world: World) -> RawTouches | None:
+def belief_record(belief: Belief, steps: list[Step]) -> dict[str, Any]:
+    """The part of result.json that says what is known, and what it was learnt from."""
+    return {
+        "verdict": belief.estimate.verdict if belief.estimate else "undetermined",
+        "touches": steps[-1].touches if steps else 0,
+        "estimate": estimate_record(belief.estimate) if belief.estimate else None,
+        "covariance": belief.covariance.tolist(),
+        "rounds": [step_record(step) for step in steps],
+    }
+
+
+def raw_touches(sensor: str, steps: list[Step], world: World | MujocoWorld) -> RawTouches | None:
     """The raw signals of all touches that met the object; None where the sensor has none."""
     probes = [probe for step in steps for probe in step.plan.probes]
     felt = [
@@ -123,7 +166,7 @@ def raw_touches(sensor: str, steps: list[Step], world: World) -> RawTouches | No
     signals = np.array([one.signal for _, one in felt])
     poses = np.array([one.X_WS for _, one in felt])
     fingers = tuple(finger for finger, _ in felt)
-    kind = raw_sensor(sensor).kind
+    kind = raw_sensor_of(world, sensor).kind
     if isinstance(kind, DepthPad):
         return RawTouches(
             poses, depth=signals, pixel_pitch=kind.pixel_pitch, pad_radius=kind.radius,

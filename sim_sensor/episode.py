@@ -11,6 +11,7 @@ from estimator.axis import Axis, angle_between, offset_at
 from estimator.contact import Contact, Miss
 from estimator.surface import SurfaceOfRevolution
 from estimator.vectors import Array, finite_array, frozen
+from sim_sensor.moves import ActMotion, Move
 from sim_sensor.pictures import Signal
 
 CHI2_95_OF_2 = 5.991  # 95 % quantile of chi squared with two degrees of freedom
@@ -81,6 +82,7 @@ class Act:
         after: What is believed with this touch.
         note: Shown with the caption.
         signal: The raw signal that was felt, shown as a small picture; or None.
+        motion: How it went in time; None lets the page choose its pace.
     Raises:
         ValueError: Shapes that do not fit, not finite, or `stop` outside [0, K - 1].
     """
@@ -94,6 +96,7 @@ class Act:
     after: BelievedAxis
     note: str = ""
     signal: Signal | None = None
+    motion: ActMotion | None = None
 
     def __post_init__(self) -> None:
         path = frozen(self.path)
@@ -123,6 +126,8 @@ class Grip:
         path: Configurations of the whole hand, in order, shape (K, nq).
         bases: Pose of the hand base in the world for each (`X_WB`).
         words: Shown with the caption.
+        times: Of each, from where the hand was left, ascending from zero [s]; None lets the page
+            choose its pace and swing the hand there.
     Raises:
         ValueError: Shapes that do not fit, or not finite.
     """
@@ -130,6 +135,7 @@ class Grip:
     path: Array
     bases: tuple[pin.SE3, ...]
     words: str = ""
+    times: Array | None = None
 
     def __post_init__(self) -> None:
         path = frozen(self.path)
@@ -137,6 +143,8 @@ class Grip:
             raise ValueError(f"grip path: expected finite numbers (K, nq), got {path.shape}")
         if len(self.bases) != len(path):
             raise ValueError(f"grip bases: expected {len(path)} poses, got {len(self.bases)}")
+        if self.times is not None:
+            Move(self.times, path, self.bases)
         object.__setattr__(self, "path", path)
 
 

@@ -104,8 +104,8 @@ def build_scene(hand: Hand, episode: Episode) -> Scene:
     beats = schedule(episode.acts)
     duration = end_of(episode, beats) + 2.0
     frames = postures(hand.model, episode, beats)
-    stage = [*_room(), *_links(hand), *_truth(episode)]
-    tracks = [*_hand_tracks(hand, frames)]
+    stage = [*room(), *links(hand), *_truth(episode)]
+    tracks = [*hand_tracks(hand, frames)]
     for i, (act, beat) in enumerate(zip(episode.acts, beats, strict=True)):
         end = None if i == len(beats) - 1 else beat.end
         stage += _belief(f"/belief/{i}/before", act.before, BEFORE, episode)
@@ -116,11 +116,11 @@ def build_scene(hand: Hand, episode: Episode) -> Scene:
             _shown(f"/belief/{i}/after", beat.touch, end),
             _shown(f"/touched/{i}", beat.touch),
         ]
-    camera = _camera(episode, frames)
+    camera = _camera(episode)
     return Scene(tuple(stage), tuple(tracks), beats, duration, camera)
 
 
-def _hand_tracks(hand: Hand, frames: tuple[Posture, ...]) -> Iterator[Track]:
+def hand_tracks(hand: Hand, frames: tuple[Posture, ...]) -> Iterator[Track]:
     """The base in the world, and every link that a joint moves in the base."""
     data, visual = hand.model.createData(), pin.GeometryData(hand.visual_model)
     placements: dict[str, list[pin.SE3]] = {}
@@ -160,14 +160,12 @@ def _shown(path: str, start: float, end: float | None = None) -> Track:
     return Track(path, "visible", "bool", (*hidden_first, (start, True), *hidden_last))
 
 
-def _links(hand: Hand) -> Iterator[Command]:
+def links(hand: Hand) -> Iterator[Command]:
     """The hand's visual meshes, in its base."""
     for shape in hand.visual_model.geometryObjects:
-        mesh = link_mesh(shape)
-        if mesh is not None:
-            grey = float(np.mean(shape.meshColor[:3]))
-            color = 0xD9B99B if grey > 0.5 else 0x4A4F57
-            yield set_mesh(_link_path(shape), mesh, color, flatShading=True)
+        grey = float(np.mean(shape.meshColor[:3]))
+        color = 0xD9B99B if grey > 0.5 else 0x4A4F57
+        yield set_mesh(_link_path(shape), link_mesh(shape), color, flatShading=True)
 
 
 def _link_path(shape: pin.GeometryObject) -> str:
@@ -208,7 +206,7 @@ def _outcome(path: str, act: Act) -> Iterator[Command]:
         yield from set_stick(f"{path}/direction{i}", begin, end, DIRECTION, 0.0012, **_XRAY)
 
 
-def _room() -> Iterator[Command]:
+def room() -> Iterator[Command]:
     """A light background and no grid."""
     for node in ("/Grid", "/Axes"):
         yield set_property(node, "visible", False)
@@ -216,9 +214,9 @@ def _room() -> Iterator[Command]:
     yield set_property("/Background", "bottom_color", [0.80, 0.84, 0.89])
 
 
-def _camera(episode: Episode, frames: tuple[Posture, ...]) -> Camera:
+def _camera(episode: Episode) -> Camera:
     """Beside the line from the object to the hand, raised, on the side that is touched."""
-    hand = np.mean([frame.X_WB.translation for frame in frames], axis=0) - episode.centre
+    hand = np.mean([act.bases[0].translation for act in episode.acts], axis=0) - episode.centre
     side = np.cross([0.0, 0.0, 1.0], hand)
     side = unit(side) if np.linalg.norm(side) > 0.02 else np.array([0.0, -1.0, 0.0])
     touched = np.mean([_place(act) for act in episode.acts], axis=0) - episode.centre
@@ -226,7 +224,8 @@ def _camera(episode: Episode, frames: tuple[Posture, ...]) -> Camera:
     away = unit(side + 0.3 * unit(hand) + np.array([0.0, 0.0, 0.4]))
     # a little below the middle: the caption covers the bottom of the picture
     target = episode.centre + 0.3 * hand - np.array([0.0, 0.0, 0.04])
-    distance = episode.half_height + 0.40
+    comes = any(act.motion is not None for act in episode.acts)  # from farther away
+    distance = episode.half_height + (0.52 if comes else 0.40)
     return Camera(frozen(target + distance * away), frozen(target))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
@@ -10,6 +10,7 @@ import pinocchio as pin
 from estimator.contact import Contact
 from estimator.vectors import Array, unit
 from sim_sensor.episode import Act, Episode
+from sim_sensor.moves import ActMotion, Move
 
 LOOK, MOVE, STAY, APPROACH, FEEL, RETREAT = 1.5, 1.6, 0.5, 1.8, 2.6, 1.2  # durations [s]
 STEPS = 10  # postures of an approach; straight in the joints between them
@@ -56,10 +57,16 @@ def schedule(acts: tuple[Act, ...]) -> tuple[Beat, ...]:
     beats: list[Beat] = []
     now = 0.0
     for i, act in enumerate(acts):
-        stays = i > 0 and _same_place(acts[i - 1], act)
-        approach = now + (LOOK if i == 0 else STAY if stays else MOVE)
-        touch = approach + APPROACH
-        beats.append(Beat(now, approach, touch, touch + FEEL, touch + FEEL + RETREAT))
+        wait = LOOK if i == 0 else STAY
+        if act.motion is None:
+            stays = i > 0 and _same_place(acts[i - 1], act)
+            come, forward, back = (0.0 if i == 0 or stays else MOVE - STAY), APPROACH, RETREAT
+        else:
+            moves = (act.motion.come, act.motion.forward, act.motion.back)
+            come, forward, back = (0.0 if move is None else move.duration for move in moves)
+        approach = now + wait + come
+        touch = approach + forward
+        beats.append(Beat(now, approach, touch, touch + FEEL, touch + FEEL + back))
         now = beats[-1].end
     return tuple(beats)
 
@@ -68,34 +75,69 @@ def postures(model: pin.Model, episode: Episode, beats: tuple[Beat, ...]) -> tup
     """The hand through all acts: to the start, along the path to its stop, wait, and back."""
     frames: list[Posture] = []
     for act, beat in zip(episode.acts, beats, strict=True):
-        if frames:
-            begin = Posture(beat.approach, *act.posture(model, 0.0))
-            frames += _moves(model, frames[-1], begin, episode.centre)
-        there = np.linspace(0.0, 1.0, STEPS)
-        for s in there:
-            time = beat.approach + s * (beat.touch - beat.approach)
-            frames.append(Posture(time, *act.posture(model, s * act.stop)))
-        for s in there:
-            time = beat.retreat + s * (beat.end - beat.retreat)
-            frames.append(Posture(time, *act.posture(model, (1.0 - s) * act.stop)))
-    frames += _grip(model, episode, frames[-1])
+        frames += (
+            _paced(act.motion, beat) if act.motion else _unpaced(model, episode, act, beat, frames)
+        )
+    frames += _grip(model, episode, replace(frames[-1], time=beats[-1].end))
     first = frames[0]
     return (Posture(0.0, first.q, first.X_WB), *frames)
 
 
+def _paced(motion: ActMotion, beat: Beat) -> list[Posture]:
+    """An act as it went."""
+    frames = []
+    if motion.come is not None:
+        frames += _at(motion.come, beat.approach - motion.come.duration)
+    frames += _at(motion.forward, beat.approach)
+    if motion.back is not None:
+        frames += _at(motion.back, beat.retreat)
+    return frames
+
+
+def _at(move: Move, start: float) -> list[Posture]:
+    return [
+        Posture(start + float(t), q, X_WB)
+        for t, q, X_WB in zip(move.times, move.path, move.bases, strict=True)
+    ]
+
+
+def _unpaced(
+    model: pin.Model, episode: Episode, act: Act, beat: Beat, before: list[Posture]
+) -> list[Posture]:
+    """An act of which nobody said how long it took."""
+    frames: list[Posture] = []
+    if before:
+        begin = Posture(beat.approach, *act.posture(model, 0.0))
+        frames += _moves(model, before[-1], begin, episode.centre)
+    there = np.linspace(0.0, 1.0, STEPS)
+    for s in there:
+        time = beat.approach + s * (beat.touch - beat.approach)
+        frames.append(Posture(time, *act.posture(model, s * act.stop)))
+    for s in there:
+        time = beat.retreat + s * (beat.end - beat.retreat)
+        frames.append(Posture(time, *act.posture(model, (1.0 - s) * act.stop)))
+    return frames
+
+
 def end_of(episode: Episode, beats: tuple[Beat, ...]) -> float:
     """When the last motion ends [s]."""
-    return beats[-1].end + (MOVE + GRIP if episode.grip else 0.0)
+    grip = episode.grip
+    if grip is None:
+        return beats[-1].end
+    return beats[-1].end + (MOVE + GRIP if grip.times is None else STAY + float(grip.times[-1]))
 
 
 def _grip(model: pin.Model, episode: Episode, last: Posture) -> list[Posture]:
-    """The hand swings to the grip's first posture, comes in and closes."""
-    if episode.grip is None:
+    """The hand goes to the grip's first posture, comes in and closes."""
+    grip = episode.grip
+    if grip is None:
         return []
-    times = last.time + MOVE + np.linspace(0.0, GRIP, len(episode.grip.path))
+    if grip.times is not None:
+        return _at(Move(grip.times, grip.path, grip.bases), last.time + STAY)
+    times = last.time + MOVE + np.linspace(0.0, GRIP, len(grip.path))
     frames = [
         Posture(float(time), q, X_WB)
-        for time, q, X_WB in zip(times, episode.grip.path, episode.grip.bases, strict=True)
+        for time, q, X_WB in zip(times, grip.path, grip.bases, strict=True)
     ]
     return _moves(model, last, frames[0], episode.centre) + frames
 
@@ -108,7 +150,12 @@ def captions(episode: Episode, beats: tuple[Beat, ...]) -> list[dict[str, object
         before, after = (_sureness(episode, act, i) for i in (0, 1))
         felt = isinstance(act.outcome, Contact)
         doing = (f"{name} approaches", f"{name} {'touches' if felt else 'meets nothing'}")
-        lines.append(_caption(beat.start, doing[0], f"believed axis: {before}"))
+        begins = beat.start
+        if act.motion is not None and act.motion.come is not None:
+            head = f"Probe {number} of {len(episode.acts)}: the hand comes"
+            lines.append(_caption(beat.start, head, f"believed axis: {before}"))
+            begins = beat.approach
+        lines.append(_caption(begins, doing[0], f"believed axis: {before}"))
         learnt = [f"before: {before}", f"after: {after}", _felt(act), act.note]
         lines.append(_caption(beat.touch, doing[1], "\n".join(line for line in learnt if line)))
         lines.append(_caption(beat.retreat, f"{name} goes back", f"believed axis: {after}"))

@@ -16,7 +16,8 @@ from estimator.vectors import basis_across
 from hand_models.hand import Hand, load_hand
 from sim_sensor.episode import Act, BelievedAxis, Episode, Grip
 from sim_sensor.meshes import tube_mesh
-from sim_sensor.timeline import captions, end_of, postures, schedule
+from sim_sensor.moves import ActMotion, Move
+from sim_sensor.timeline import STAY, captions, end_of, postures, schedule
 from sim_sensor.view import write_page
 
 
@@ -123,3 +124,42 @@ def test_acts_are_checked(hand: Hand, episode: Episode, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="act 1: allegro_right has 16 joint positions"):
         write_page(tmp_path / "p.html", hand, Episode(episode.surface, (wrong,)))
     assert not list(tmp_path.iterdir())
+
+
+def moved(episode: Episode) -> Episode:
+    """The first two acts with their motions in time, the hand coming from afar to each."""
+    acts = []
+    for act in episode.acts[:2]:
+        far = pin.SE3(act.bases[0].rotation, act.bases[0].translation + np.array([0.0, 0.0, 0.2]))
+        come = Move(np.array([0.0, 1.5]), act.path[[0, 0]], (far, act.bases[0]))
+        forward = Move(np.linspace(0.0, 2.5, 6), act.path, act.bases)
+        back = Move(np.array([0.0, 0.7]), act.path[[5, 0]], (act.bases[5], far))
+        acts.append(replace(act, motion=ActMotion(come, forward, back)))
+    return replace(episode, acts=tuple(acts))
+
+
+def test_motions_are_played_at_their_own_speed(hand: Hand, episode: Episode) -> None:
+    paced = moved(episode)
+    first, second = schedule(paced.acts)
+    assert first.touch - first.approach == pytest.approx(2.5)
+    assert first.end - first.retreat == pytest.approx(0.7)
+    assert second.approach - second.start == pytest.approx(STAY + 1.5)
+    frames = postures(hand.model, paced, (first, second))
+    assert all(b.time >= a.time for a, b in pairwise(frames))
+    there = [frame for frame in frames if frame.time == pytest.approx(first.touch)]
+    np.testing.assert_allclose(there[0].q, paced.acts[0].path[-1])
+    heads = [line["head"] for line in captions(paced, (first, second))]
+    assert heads[0].endswith("the hand comes")
+    assert heads[1].endswith("approaches")
+
+
+def test_a_grip_in_time_is_played_at_its_own_speed(hand: Hand, episode: Episode) -> None:
+    act = episode.acts[0]
+    times = np.array([0.0, 0.4, 2.0, 2.2, 3.0, 7.5])
+    gripped = replace(moved(episode), grip=Grip(act.path, act.bases, "closing", times))
+    beats = schedule(gripped.acts)
+    frames = postures(hand.model, gripped, beats)
+    assert frames[-1].time == pytest.approx(beats[-1].end + STAY + 7.5)
+    assert end_of(gripped, beats) == pytest.approx(frames[-1].time)
+    with pytest.raises(ValueError, match="ascending from zero"):
+        Grip(act.path, act.bases, "closing", times[::-1])

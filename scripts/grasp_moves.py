@@ -1,0 +1,93 @@
+"""What became of planned motions: the hand's postures in time, for the page of plan_grasp.py."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+
+from hand_models.hand import Hand
+from planner.explore import Step
+from planner.grasp import Grasp
+from planner.grasp_travel import GraspMotion, closing_motion
+from planner.options import PlannerOptions
+from planner.round_motion import withdrawal
+from planner.timing import MotionLimits
+from planner.trajectory import Array, Configuration, Trajectory
+from sim_sensor.episode import Grip
+from sim_sensor.moves import ActMotion, Move
+from sim_sensor.world import TouchRecord
+
+FRAME = 0.05  # between postures that are shown [s]
+PAUSE = 0.3  # between motions [s]
+HOME = pin.SE3(pin.rpy.rpyToMatrix(0.0, 1.2, 0.0), np.array([0.15, 0.0, 0.45]))
+
+
+def from_home(hand: Hand, options: PlannerOptions) -> PlannerOptions:
+    """With the hand in the middle of its workspace, or between the robot and the object."""
+    nominal = options.reach.workspace.X_WB
+    return replace(options, start=Configuration(hand.middle, HOME if nominal is None else nominal))
+
+
+def left_at(steps: Sequence[Step], start: Configuration | None) -> Configuration | None:
+    """Where the last placement left the hand."""
+    if not steps:
+        return start
+    way = steps[-1].plan.retreat
+    return Configuration(way.path[-1], way.bases[-1])
+
+
+def act_motions(
+    hand: Hand, limits: MotionLimits, step: Step, records: Sequence[TouchRecord]
+) -> list[ActMotion | None]:
+    """One placement as it went: each finger up to where it stopped, and back from there."""
+    motion = step.plan.motion
+    if motion is None:
+        return [None] * len(step.plan.probes)
+    acts: list[ActMotion | None] = []
+    pairs = zip(step.plan.probes, motion.probes, records, strict=True)
+    for j, (probe, (forward, _), record) in enumerate(pairs):
+        come = [motion.transfer, motion.enter] if j == 0 else []
+        back = [withdrawal(hand, limits, probe.approach, record.stop, motion.retreat.q)]
+        if j == len(records) - 1:
+            back.append(motion.leave)
+        gone = move([forward.until(forward.time_of(record.stop))])
+        if gone is None:
+            return [None] * len(records)
+        acts.append(ActMotion(move(come), gone, move(back)))
+    return acts
+
+
+def grip_motion(hand: Hand, grasp: Grasp, motion: GraspMotion, path: Array, words: str) -> Grip:
+    """The way to the grasp and in, then the fingers along `path`, as far as each went."""
+    closing = closing_motion(hand, motion.limits, grasp.reach, path, len(path) - 1)
+    made = move([motion.transfer, motion.enter, closing])
+    assert made is not None  # the fingers move
+    return Grip(made.path, made.bases, words, made.times)
+
+
+def move(parts: Sequence[Trajectory | None]) -> Move | None:
+    """Trajectories one after another, thinned to what a page shows."""
+    times, q, bases, now = [], [], [], 0.0
+    for part in parts:
+        if part is None:
+            continue
+        rows = _shown(part.times)
+        times.append(now + part.times[rows])
+        q.append(part.q[rows])
+        bases += [part.bases[k] for k in rows]
+        now += part.duration + PAUSE
+    if not times:
+        return None
+    return Move(np.concatenate(times), np.vstack(q), tuple(bases))
+
+
+def _shown(times: Array) -> list[int]:
+    """Rows about a frame apart, first and last among them."""
+    rows = [0]
+    for k in range(1, len(times) - 1):
+        if times[k] - times[rows[-1]] >= FRAME:
+            rows.append(k)
+    return [*rows, len(times) - 1]
