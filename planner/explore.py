@@ -3,9 +3,9 @@
 Where three fingers reach at once, they touch in one placement of the hand; where not, two or one
 do, and the hand moves between. Where the object is so vaguely known that most placements would
 miss with a finger, one finger feels for it first. Where several axes are left, or the first touches
-meet the goal with nothing to confirm them, or one more is likely to meet it, a single touch follows
-(`planner.next_touch`). Touches that contradict earlier ones widen the belief (`planner.surprise`),
-and others have to agree before the goal counts.
+meet the goal with nothing to confirm them, or placements agree and one more touch is likely to meet
+it, a single touch follows (`planner.next_touch`). Touches that contradict earlier ones widen the
+belief (`planner.surprise`), and others have to agree before the goal counts.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ def explore(
     while touches < budget and not (goal.met_by(learnt.belief) and learnt.settled):
         before = learnt.belief
         try:
-            plan = _plan(hand, before, sensor, goal, budget - touches, rng, options)
+            plan = _plan(hand, learnt, sensor, goal, budget - touches, rng, options)
         except NoPlan:
             if goal.met_by(before):
                 return  # nothing to confirm it with is within reach
@@ -101,7 +101,7 @@ def _moved(options: PlannerOptions, plan: Plan) -> PlannerOptions:
 
 def _plan(
     hand: Hand,
-    belief: Belief,
+    learnt: Learnt,
     sensor: SensorNoise,
     goal: Goal,
     left: int,
@@ -109,13 +109,14 @@ def _plan(
     options: PlannerOptions,
 ) -> Plan:
     """One touch where one will do: to feel, to tell, to confirm; a placement otherwise."""
+    belief = learnt.belief
     few = replace(options, tries=min(options.tries, TELLING_TRIES))
     if goal.met_by(belief):
         return next_touch(hand, belief, sensor, goal=goal, rng=rng, options=few)
     if _ambiguous(belief) and options.criterion == "information":
         with suppress(NoPlan):
             return next_touch(hand, belief, sensor, goal=goal, rng=rng, options=few)
-    if options.criterion == "information" and goal.nearly_met_by(belief):
+    if options.criterion == "information" and learnt.settled and goal.nearly_met_by(belief):
         with suppress(NoPlan):
             one_more = next_touch(hand, belief, sensor, goal=goal, rng=rng, options=few)
             if goal.would_be_met(belief, one_more.covariance):
