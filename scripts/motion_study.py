@@ -97,7 +97,7 @@ class Found:
     looked_at: int = 0
     meetings: list[str] = field(default_factory=list)
     beyond_limits: list[str] = field(default_factory=list)
-    free_meets_truth: list[str] = field(default_factory=list)
+    meets_truth: list[str] = field(default_factory=list)
     clearance: dict[str, float] = field(default_factory=dict)
     duration: float = 0.0
     refused: dict[str, int] = field(default_factory=dict)
@@ -210,16 +210,16 @@ def look_at(hand: Hand, scene: Scene, plan: Plan, limits: MotionLimits, found: F
         found.phases.append(one.phase)
         found.duration += one.duration
         found.beyond_limits += beyond(hand, one, limits)
-        free_meets = False
+        meets_truth = False
         for at, q, X_WB in places(one):
             found.looked_at += 1
             met = believed.meeting(q, X_WB, touching=_touching(one, at))
             if met is not None:
                 found.meetings.append(f"{one.phase} at {at:.2f} s: {met[0]} meets {met[1]}")
-            if one.phase == "transfer" and not free_meets:
-                free_meets = true.meeting(q, X_WB) is not None
-        if free_meets:
-            found.free_meets_truth.append(one.phase)
+            if one.phase in ("transfer", "enter") and not meets_truth:
+                meets_truth = true.meeting(q, X_WB) is not None
+        if meets_truth:
+            found.meets_truth.append(one.phase)
 
 
 def places(one: Trajectory) -> Iterator[tuple[float, Any, pin.SE3]]:
@@ -263,7 +263,9 @@ def report(found: list[Found]) -> Table:
     table = Table(title=f"{len(found)} runs, {len(planned)} planned, {motions} motions")
     for heading, justify in (("what", "left"), ("count", "right")):
         table.add_column(heading, justify=justify)  # type: ignore[arg-type]
-    blind = sum(bool(one.free_meets_truth) for one in planned)
+    blind, guarded = (
+        sum(phase in one.meets_truth for one in planned) for phase in ("transfer", "enter")
+    )
     refused = Counter[str]()
     for one in found:
         refused.update(one.refused)
@@ -273,6 +275,7 @@ def report(found: list[Found]) -> Table:
         ("runs beyond a limit", _share(sum(bool(o.beyond_limits) for o in planned), len(planned))),
         ("transfers that went round something", f"{sum(one.went_round for one in planned)}"),
         ("free motions that meet the true object", _share(blind, len(planned))),
+        ("guarded ways in that meet it", _share(guarded, len(planned))),
         ("candidates refused for their motion", f"{sum(refused.values())}"),
         ("of them without a reason", f"{sum(n for words, n in refused.items() if not words)}"),
         ("duration of a round, median [s]", f"{np.median([o.duration for o in planned]):.1f}"),
