@@ -127,18 +127,21 @@ def faults(
     hand: Hand, found: Certificate, q: Array, fingers: tuple[str, ...], allowed: Tolerances
 ) -> Iterator[str]:
     """What the certificate does not keep, in words, the gravest kind first."""
-    for name, residual in zip(fingers, found.position_residuals, strict=True):
+    farthest = np.argsort(-found.position_residuals, kind="stable")
+    for name, residual in ((fingers[i], found.position_residuals[i]) for i in farthest):
         if residual > allowed.position:
             far = f"{name} stays {1e3 * residual:.1f} mm from its contact"
-            yield far + _at_limits(hand, q, name)
+            yield far + at_limits(hand, q, name)
     for name, angle in zip(fingers, found.pad_angles, strict=True):
         if angle > allowed.cone + 1e-3:
             yield (
-                f"{name} pad is {np.degrees(angle):.0f} deg off the surface normal, allowed are"
-                f" {np.degrees(allowed.cone):.0f}{_at_limits(hand, q, name)}"
+                f"{name}: pad normal {np.degrees(angle):.0f} deg off (cone"
+                f" {np.degrees(allowed.cone):.0f}){at_limits(hand, q, name)}"
             )
-    if found.limit_margin < -1e-6:
-        yield f"a joint is {-found.limit_margin:.3f} rad beyond its limit"
+    beyond = np.maximum(hand.lower - q, q - hand.upper)
+    if beyond.max() > 1e-6:
+        joint = hand.joint_names[int(np.argmax(beyond))]
+        yield f"{joint} is {beyond.max():.3f} rad beyond its limit"
     pair = found.self_pair
     if pair.distance < allowed.self_clearance:
         yield gap_in_words(pair)
@@ -159,7 +162,7 @@ def gap_in_words(pair: LinkPair) -> str:
     return f"{pair.first} and {pair.second} {word} {1e3 * abs(pair.distance):.1f} mm"
 
 
-def _at_limits(hand: Hand, q: Array, finger: str) -> str:
+def at_limits(hand: Hand, q: Array, finger: str) -> str:
     """Joints of the finger that have no way left, as a clause."""
     stuck = [
         f"{name} at its {'lower' if q[i] - hand.lower[i] < _AT_LIMIT else 'upper'} limit"

@@ -2,10 +2,11 @@
 
 The rule "three contacts about 90 degrees apart in meridian, never opposite, avoiding shared
 parallels and normals that meet on the axis" has three parts here. Singular triples are refused
-with a margin that holds for nine in ten objects drawn from the belief. The corrected bound of
-eqs (64)-(72) for the best *pair* prefers pairs near 90 degrees. The third contact follows what it
-is worth: the expected error of the axis after the touches, misses included, and the odds that the
-labels come out right. Other criteria are for comparison (`planner.criteria`).
+with a margin that holds for three in four objects drawn from the belief, and charged for the
+others. The corrected bound of eqs (64)-(72) for the best *pair* prefers pairs near 90 degrees. The
+third contact follows what it is worth: the expected error of the axis after the touches, the
+chance that a finger misses, and the odds that the labels come out right. Other criteria are for
+comparison (`planner.criteria`).
 """
 
 from __future__ import annotations
@@ -31,10 +32,12 @@ from planner.candidates import Candidates
 from planner.criteria import REFUSING, Criterion, Merits, costs
 from planner.goal import Goal
 from planner.prospects import Prospects, prospects
-from planner.worth import Worth, guarded
+from planner.worth import Worth, doubtful_margins, guarded
 
-MARGIN = 0.08  # from every singularity, in nine of ten sampled objects
+MARGIN = 0.08  # from every singularity, in three of four sampled objects
 MISLABEL_COST = 4.0  # a wrong labelling is this much worse, as a logarithm of error
+MISS_COST = 1.0  # likewise a finger that misses, beside what it does not tell
+SINGULAR_COST = 2.0  # and touches within the margin
 SHORT_LIST = 20
 ODDS_OBJECTS = 2
 
@@ -52,7 +55,7 @@ class Ranking:
         angle, offset: Expected error of the axis after the touches [rad], [m].
         covariance: Predicted for the believed object, (N, 4, 4).
         pair_bound: Worst case of the axis from the best pair, eqs (64)-(72) corrected.
-        margin: From the nearest singularity in nine of ten objects [-]; infinite for fewer than
+        margin: From the nearest singularity in three of four objects [-]; infinite for fewer than
             three contacts.
         nearest: That singularity in words.
         label_probability: That the labels come out right by these touches alone; NaN where that
@@ -106,10 +109,14 @@ def rank(
     after = worth.covariances(landed)
     value, angle, offset = _expected_error(after)
     bound, best_bound = _pair_bound(candidates.theta, place, noise)
-    low = worth.least_margins(landed)  # (N, K)
+    margins = worth.margins(landed)  # (B, N, K)
+    low = doubtful_margins(margins)
     margins_at, nearest = low.min(axis=1), _named(low)
     merits = Merits(candidates.theta, candidates.z, value, after, bound, best_bound, belief, goal)
     cost = costs(criterion, merits, rng)
+    if criterion == "information":
+        cost = cost + MISS_COST * np.mean(~landed.hit.all(axis=2), axis=0)
+        cost += SINGULAR_COST * np.mean(margins.min(axis=2) < margin, axis=0)
     least = margin if criterion in REFUSING else 0.0
     kept = np.nonzero(margins_at >= least)[0]
     order = kept[np.argsort(cost[kept], kind="stable")].astype(np.intp)

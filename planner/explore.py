@@ -1,9 +1,11 @@
 """Plan, touch, learn, and again: a generator that the caller bounds.
 
 Where three fingers reach at once, they touch in one placement of the hand; where not, two or one
-do, and the hand moves between. Where several axes are left, or the first touches meet the goal with
-nothing to confirm them, a single touch follows (`planner.next_touch`). Touches that contradict
-earlier ones widen the belief (`planner.surprise`), and others have to agree before the goal counts.
+do, and the hand moves between. Where the object is so vaguely known that most placements would
+miss with a finger, one finger feels for it first. Where several axes are left, or the first touches
+meet the goal with nothing to confirm them, or placements agree and one more touch is likely to meet
+it, a single touch follows (`planner.next_touch`). Touches that contradict earlier ones widen the
+belief (`planner.surprise`), and others have to agree before the goal counts.
 """
 
 from __future__ import annotations
@@ -21,9 +23,11 @@ from planner.goal import Goal
 from planner.next_touch import next_touch
 from planner.options import PlannerOptions
 from planner.plan import NoPlan, Plan, Probe, plan_probes
+from planner.risk import MISSED
 from planner.surprise import Learnt, learn
 from planner.trajectory import Configuration
 
+UNLIKELY = 0.5  # chance of a miss from which a placement is not worth its three touches
 TELLING_TRIES = 6  # best single touches that are handed to the optimiser
 
 Touch = Callable[[Probe], Contact | Miss]
@@ -76,7 +80,7 @@ def explore(
     while touches < budget and not (goal.met_by(learnt.belief) and learnt.settled):
         before = learnt.belief
         try:
-            plan = _plan(hand, before, sensor, goal, budget - touches, rng, options)
+            plan = _plan(hand, learnt, sensor, goal, budget - touches, rng, options)
         except NoPlan:
             if goal.met_by(before):
                 return  # nothing to confirm it with is within reach
@@ -97,24 +101,37 @@ def _moved(options: PlannerOptions, plan: Plan) -> PlannerOptions:
 
 def _plan(
     hand: Hand,
-    belief: Belief,
+    learnt: Learnt,
     sensor: SensorNoise,
     goal: Goal,
     left: int,
     rng: np.random.Generator,
     options: PlannerOptions,
 ) -> Plan:
-    """One touch to tell the axes apart or to confirm the only one, a placement otherwise."""
+    """One touch where one will do: to feel, to tell, to confirm; a placement otherwise."""
+    belief = learnt.belief
     few = replace(options, tries=min(options.tries, TELLING_TRIES))
     if goal.met_by(belief):
         return next_touch(hand, belief, sensor, goal=goal, rng=rng, options=few)
     if _ambiguous(belief) and options.criterion == "information":
         with suppress(NoPlan):
             return next_touch(hand, belief, sensor, goal=goal, rng=rng, options=few)
+    if options.criterion == "information" and learnt.settled and goal.nearly_met_by(belief):
+        with suppress(NoPlan):
+            one_more = next_touch(hand, belief, sensor, goal=goal, rng=rng, options=few)
+            if goal.would_be_met(belief, one_more.covariance):
+                return one_more
     at_once = min(options.fingers_at_once, left)
     margin = options.margin if _fresh(belief) else 0.0
     this_time = replace(options, fingers_at_once=at_once, margin=margin)
-    return plan_probes(hand, belief, sensor, goal=goal, rng=rng, options=this_time)
+    plan = plan_probes(hand, belief, sensor, goal=goal, rng=rng, options=this_time)
+    if options.criterion != "information" or belief.contacts or plan.chance_of(MISSED) < UNLIKELY:
+        return plan
+    with suppress(NoPlan):
+        feeling = next_touch(hand, belief, sensor, goal=goal, rng=rng, options=few)
+        if feeling.chance_of(MISSED) < plan.chance_of(MISSED):
+            return feeling
+    return plan
 
 
 def _ambiguous(belief: Belief) -> bool:

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimator.belief import Belief
+from estimator.vectors import Array
+
+NEARLY = 2.0  # times the goal, from where one more touch may do
 
 
 @dataclass(frozen=True)
@@ -35,6 +38,27 @@ class Goal:
         if estimate is None or estimate.verdict != "determined":
             return False
         return bool(estimate.angle_95 <= self.angle and estimate.offset_95 <= self.offset)
+
+    def nearly_met_by(self, belief: Belief) -> bool:
+        """Determined, and within `NEARLY` times the goal."""
+        return Goal(min(NEARLY * self.angle, 0.5 * np.pi), NEARLY * self.offset).met_by(belief)
+
+    def would_be_met(self, belief: Belief, covariance: Array) -> bool:
+        """Whether a determined axis would be known well enough with this covariance.
+
+        The 95 % errors are taken to shrink as the root mean square errors do.
+
+        Args:
+            covariance: Of the axis in its chart, as touches are expected to leave it, (4, 4).
+        """
+        estimate = belief.estimate
+        if estimate is None or estimate.verdict != "determined":
+            return False
+        now = np.diag(belief.covariance)
+        then = np.diag(covariance)
+        offset = estimate.offset_95 * np.sqrt(then[:2].sum() / now[:2].sum())
+        angle = estimate.angle_95 * np.sqrt(then[2:].sum() / now[2:].sum())
+        return bool(angle <= self.angle and offset <= self.offset)
 
     def missing(self, belief: Belief) -> str:
         """What is missing, in words; empty where the goal is met."""

@@ -148,7 +148,7 @@ def best_touches(worth: Worth, grid: Grid, touches: int, *, margin: float) -> Op
 
     Args:
         touches: How many.
-        margin: From every singularity, in nine of ten objects.
+        margin: From every singularity, in three of four objects.
     """
     landed = _land(worth, grid.theta, grid.z)
     sets = _sets(len(grid.theta), touches)

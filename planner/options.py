@@ -24,7 +24,7 @@ class PlannerOptions:
     Args:
         reach: Rules of reachability: pad cone, clearances, the arm's workspace, stroke.
         fingers_at_once: Contacts of one placement of the hand; fewer where so many do not reach.
-        margin: Smallest margin from every singularity, kept by nine in ten sampled objects [-].
+        margin: Smallest margin from every singularity, kept by three in four sampled objects [-].
         placements: How many placements of the hand are fitted to the believed surface.
         objects: How many objects are drawn from the belief.
         tries: How many of the best placements are handed to the optimiser.
@@ -46,7 +46,7 @@ class PlannerOptions:
     fingers_at_once: int = 3
     margin: float = MARGIN
     placements: int = 480
-    objects: int = 20
+    objects: int = 24
     tries: int = 24
     offset_guard: float = OFFSET_GUARD
     criterion: Criterion = "information"

@@ -46,7 +46,7 @@ class Plan:
         bound: Worst case of the axis from the best pair of the probes.
         covariance: Of the axis after the probes, if the object is as believed, (4, 4).
         angle, offset: Expected error of the axis after them, over the belief [rad], [m].
-        margin: From the nearest singularity, in nine of ten objects; inf below three contacts.
+        margin: From the nearest singularity, in three of four objects; inf below three contacts.
         nearest: That singularity in words.
         label_probability: That the labels come out right; NaN where it was not computed.
         funnel: How many candidates there were, and what refused the others.
@@ -70,6 +70,10 @@ class Plan:
     risks: tuple[Risk, ...] = ()
     choice: ChoiceCertificate | None = None
     motion: RoundMotion | None = None
+
+    def chance_of(self, name: str) -> float:
+        """Of one of the risks (`planner.risk` names them); 0 where it is not worth saying."""
+        return next((risk.chance for risk in self.risks if risk.name == name), 0.0)
 
 
 class NoPlan(Exception):

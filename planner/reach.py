@@ -16,7 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 from hand_models.collision import HandCollision
 from hand_models.hand import Hand
 from hand_models.spheres import link_spheres
+from planner.diagnosis import cone_fault
 from planner.inspection import inspect
+from planner.reach_kinematics import LENGTH
 from planner.reach_model import Motion, ReachModel
 from planner.reach_outcome import Reach, Unreachable
 from planner.reach_task import ReachOptions, ReachTask, Solution, solve_task
@@ -153,8 +155,12 @@ class ReachSolver:
             return Unreachable("no start was given and none was to be looked up", (), (), 0)
         nearest = min(failed, key=lambda solution: solution.violation)
         found = inspect(self.hand, self._collision, task, nearest).faults
-        reason = found[0] if found else "the optimiser stopped short of a solution"
-        return Unreachable(reason, found, nearest.fingers, len(failed))
+        if not nearest.violation < _HOPELESS:
+            model = self._model(tuple(sorted(map(self._index, nearest.fingers))), "none")
+            turned = cone_fault(self.hand, self._collision, model, task, nearest)
+            found = found if turned is None else (turned, *found)
+        short = f"the optimiser stopped {1e3 * LENGTH * nearest.violation:.2f} mm short"
+        return Unreachable(found[0] if found else short, found, nearest.fingers, len(failed))
 
     def _model(self, fingers: tuple[int, ...], motion: Motion) -> ReachModel:
         key = (fingers, motion)

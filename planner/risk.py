@@ -1,6 +1,6 @@
 """What may go wrong with touches that are planned: singular or ambiguous after all, and how likely.
 
-A plan keeps its margins in nine of ten objects that it was chosen by. Here other objects are drawn
+A plan keeps its margins in most objects that it was chosen by. Here other objects are drawn
 from the belief, so that a choice is not judged by what it was chosen for.
 """
 

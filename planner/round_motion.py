@@ -76,9 +76,7 @@ def plan_round(
         probes.append(pair)
         certificates += found
     reason = ""
-    for way in ways:
-        if way.clearance < min(way.wanted, OUTSIDE):
-            continue
+    for way in _ways(movable, ways):
         outer = _outer(movable, way, start)
         if isinstance(outer, str):
             reason = reason or outer
@@ -90,6 +88,13 @@ def plan_round(
             together([*certificates, *found]), transfer.sampled,
         )  # fmt: skip
     return reason or "no straight way out leads away from the object"
+
+
+def _ways(movable: Movable, ways: Sequence[Retreat]) -> list[Retreat]:
+    """Those that lead away; a base that is fixed stays, and joints alone lead to the next place."""
+    if movable.workspace.is_fixed:
+        return [replace(ways[0], bases=ways[0].bases[:1], clearance=ways[0].nearest)]
+    return [way for way in ways if way.clearance >= min(way.wanted, OUTSIDE)]
 
 
 def probe_motion(

@@ -100,7 +100,7 @@ def plan_transfer(
             if pair.distance < (0.0 if thing == ITSELF else ROOM):
                 return f"{gap_in_words(pair)} {word}"
     direct = _line(begin, end)
-    straight = _timed(movable, direct, margin)
+    straight = _blocked(movable, direct, margin) or _timed(movable, direct, margin)
     if not isinstance(straight, str):
         return straight
     found = sampled_path(movable, begin, end, margin=margin, checks=CHECKS)
@@ -119,6 +119,20 @@ def _rounded(movable: Movable, corners: list[Configuration], margin: float) -> T
             return Transfer(made.trajectory, made.certificate, sampled=True)
         fault = made
     return f"on the way round, {fault}"
+
+
+def _blocked(
+    movable: Movable, path: tuple[Array, tuple[pin.SE3, ...]], margin: float
+) -> str | None:
+    """What is in the way at the first point of a path that is not free: cheaper than its times."""
+    least = {body.name: ROOM for body in movable.around.fixed} | {ITSELF: 0.0, OBJECT: margin}
+    for q, X_WB in zip(*path, strict=True):
+        if movable.around.is_free(q, X_WB, margin):
+            continue
+        for thing, pair in movable.around.pairs(q, X_WB):
+            if pair.distance < least[thing]:
+                return gap_in_words(pair)
+    return None
 
 
 def _timed(

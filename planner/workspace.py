@@ -36,6 +36,11 @@ class Workspace:
         if not 0.0 <= self.rotation_range <= np.pi:
             raise ValueError(f"rotation_range must be in [0, pi] rad, got {self.rotation_range}")
 
+    @property
+    def is_fixed(self) -> bool:
+        """Whether the base stays where it is: only joints move."""
+        return self.X_WB is not None and self.position_range == self.rotation_range == 0.0
+
     def allows(self, R_WB: Array, p_WB: Array) -> NDArray[np.bool_]:
         """(N,) which of the poses R (N, 3, 3), p (N, 3) are in range."""
         return self.violation(R_WB, p_WB) <= 1e-6

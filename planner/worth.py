@@ -15,7 +15,7 @@ from estimator.vectors import Array
 from planner.goal import Goal
 from planner.prospects import Prospects, with_earlier
 
-DOUBTFUL_OBJECTS = 0.1
+DOUBTFUL_OBJECTS = 0.25  # share of the objects that may come nearer to a singularity
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,20 +51,30 @@ class Worth:
         return np.asarray(np.linalg.inv(total)[..., :4, :4])
 
     def least_margins(self, landed: Prospects) -> Array:
-        """Margin that nine of ten objects keep from each singularity, (N, K).
+        """Margin that three of four objects keep from each singularity, (N, K)."""
+        return doubtful_margins(self.margins(landed))
+
+    def margins(self, landed: Prospects) -> Array:
+        """From each singularity on each object, (B, N, K).
 
         Of the triple that the touches make together with the contacts there already are; where
-        more or fewer than three are in all, no triple has to be good: infinite, (N, 1).
+        more or fewer than three are in all, no triple has to be good: infinite, (B, N, 1).
         """
         earlier = np.array([c.position for c in self.belief.contacts]).reshape(-1, 3)
         triples = with_earlier(landed, self.samples, earlier)
         if triples is None:
-            return np.full((landed.theta.shape[1], 1), np.inf)
-        return np.asarray(np.quantile(margins(triples).values, DOUBTFUL_OBJECTS, axis=0))
+            return np.full((*landed.theta.shape[:2], 1), np.inf)
+        return margins(triples).values
 
     def _scaled(self, information: Array) -> Array:
         goal = self.goal
         return in_goals(information, angle=goal.angle, offset=goal.offset, height=self.height)
+
+
+def doubtful_margins(margins: Array) -> Array:
+    """Margins (B, N, K) that three of four objects keep, (N, K)."""
+    quantile = np.quantile(margins, DOUBTFUL_OBJECTS, axis=0, method="lower")  # infinite ones stay
+    return np.asarray(quantile)
 
 
 def guarded(noise: SensorNoise, offset: float) -> SensorNoise:

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
+from worlds import raw_sensor_of
 
-from estimator.belief import update
+from estimator.belief import Belief, update
 from estimator.contact import Contact, Miss
 from estimator.readers.raw_files import RawTouches
 from estimator.readers.raw_sensors import DepthPad, raw_sensor
+from estimator.records import estimate_record
 from estimator.surface import SurfaceOfRevolution
 from planner.explore import Step
 from planner.grasp_travel import GraspMotion
+from planner.messages import step_record
 from planner.plan import Probe
+from planner.risk import risks_in_words
 from planner.round_motion import RoundMotion
 from sim_sensor.episode import Act, BelievedAxis, Episode, Grip
 from sim_sensor.feeling import Felt
@@ -25,6 +30,9 @@ from sim_sensor.pictures import Signal
 from sim_sensor.world import TouchRecord, World
 
 Motions = Callable[[Step, Sequence[TouchRecord]], Sequence[ActMotion | None]]
+
+if TYPE_CHECKING:
+    from sim_sensor.mujoco_world import MujocoWorld
 
 
 def print_round(console: Console, step: Step, number: int) -> None:
@@ -48,6 +56,10 @@ def print_round(console: Console, step: Step, number: int) -> None:
             f"  worst case of the best pair {np.rad2deg(plan.bound.angle):.1f} deg, margin "
             f"{plan.margin:.2f} from: {plan.nearest}"
         )
+    if plan.choice is not None:
+        console.print(f"  {plan.choice.words}")
+    if plan.risks:
+        console.print(f"  {risks_in_words(plan.risks)}")
     if plan.motion is not None:
         console.print(f"  {motion_in_words(plan.motion)}")
     if step.surprise is not None:
@@ -96,7 +108,7 @@ def _shown(sensor: str, felt: Felt | None) -> Signal | None:
 
 def episode_of(
     surface: SurfaceOfRevolution,
-    world: World,
+    world: World | MujocoWorld,
     steps: list[Step],
     conclusion: str,
     sensor: str = "",
@@ -130,7 +142,18 @@ def episode_of(
     return Episode(surface, tuple(acts), conclusion=conclusion, grip=grip)
 
 
-def raw_touches(sensor: str, steps: list[Step], world: World) -> RawTouches | None:
+def belief_record(belief: Belief, steps: list[Step]) -> dict[str, Any]:
+    """The part of result.json that says what is known, and what it was learnt from."""
+    return {
+        "verdict": belief.estimate.verdict if belief.estimate else "undetermined",
+        "touches": steps[-1].touches if steps else 0,
+        "estimate": estimate_record(belief.estimate) if belief.estimate else None,
+        "covariance": belief.covariance.tolist(),
+        "rounds": [step_record(step) for step in steps],
+    }
+
+
+def raw_touches(sensor: str, steps: list[Step], world: World | MujocoWorld) -> RawTouches | None:
     """The raw signals of all touches that met the object; None where the sensor has none."""
     probes = [probe for step in steps for probe in step.plan.probes]
     felt = [
@@ -143,7 +166,7 @@ def raw_touches(sensor: str, steps: list[Step], world: World) -> RawTouches | No
     signals = np.array([one.signal for _, one in felt])
     poses = np.array([one.X_WS for _, one in felt])
     fingers = tuple(finger for finger, _ in felt)
-    kind = raw_sensor(sensor).kind
+    kind = raw_sensor_of(world, sensor).kind
     if isinstance(kind, DepthPad):
         return RawTouches(
             poses, depth=signals, pixel_pitch=kind.pixel_pitch, pad_radius=kind.radius,

@@ -50,6 +50,7 @@ from sim_sensor.objects import load_object
 
 OBJECTS = ("can", "bottle", "cone", "cup", "barrel", "vase", "knob", "egg")
 TABLE_BELOW = 0.16  # the object's middle, at least [m]
+HAND_LENGTH = 0.28  # and half a box [m]
 GOAL = Goal(float(np.deg2rad(3.0)), 2e-3)
 MOTION_WORDS = ("approach:", "on the way", "no straight way out")
 
@@ -96,7 +97,7 @@ class Found:
     looked_at: int = 0
     meetings: list[str] = field(default_factory=list)
     beyond_limits: list[str] = field(default_factory=list)
-    free_meets_truth: list[str] = field(default_factory=list)
+    meets_truth: list[str] = field(default_factory=list)
     clearance: dict[str, float] = field(default_factory=dict)
     duration: float = 0.0
     refused: dict[str, int] = field(default_factory=dict)
@@ -159,10 +160,16 @@ def draw_scene(hand: Hand, rng: np.random.Generator) -> Scene:
     turn = pin.rpy.rpyToMatrix(*rng.uniform([-0.5, 0.5, -0.8], [0.5, 1.6, 0.8]))
     place = np.array([0.5, 0.0, 0.2]) + rng.uniform([-0.45, -0.3, 0.0], [-0.25, 0.3, 0.35])
     start = Configuration(hand.middle, pin.SE3(turn, place))
-    boxes = tuple(_box(k, rng) for k in range(rng.integers(0, 4)))
+    drawn = (_box(k, rng) for k in range(rng.integers(0, 4)))
+    boxes = tuple(box for box in drawn if _far(box, start))
     low = float(truth.profile.z_range[0])
     table = 0.2 + min(low, -TABLE_BELOW) - 0.02 if rng.random() < 0.5 else None
     return Scene(name, truth, belief, start, boxes, table)
+
+
+def _far(box: Box, start: Configuration) -> bool:
+    """Not where the hand is."""
+    return bool(np.linalg.norm(box.centre - start.X_WB.translation) > HAND_LENGTH)
 
 
 def _box(k: int, rng: np.random.Generator) -> Box:
@@ -203,16 +210,16 @@ def look_at(hand: Hand, scene: Scene, plan: Plan, limits: MotionLimits, found: F
         found.phases.append(one.phase)
         found.duration += one.duration
         found.beyond_limits += beyond(hand, one, limits)
-        free_meets = False
+        meets_truth = False
         for at, q, X_WB in places(one):
             found.looked_at += 1
             met = believed.meeting(q, X_WB, touching=_touching(one, at))
             if met is not None:
                 found.meetings.append(f"{one.phase} at {at:.2f} s: {met[0]} meets {met[1]}")
-            if one.phase == "transfer" and not free_meets:
-                free_meets = true.meeting(q, X_WB) is not None
-        if free_meets:
-            found.free_meets_truth.append(one.phase)
+            if one.phase in ("transfer", "enter") and not meets_truth:
+                meets_truth = true.meeting(q, X_WB) is not None
+        if meets_truth:
+            found.meets_truth.append(one.phase)
 
 
 def places(one: Trajectory) -> Iterator[tuple[float, Any, pin.SE3]]:
@@ -256,7 +263,9 @@ def report(found: list[Found]) -> Table:
     table = Table(title=f"{len(found)} runs, {len(planned)} planned, {motions} motions")
     for heading, justify in (("what", "left"), ("count", "right")):
         table.add_column(heading, justify=justify)  # type: ignore[arg-type]
-    blind = sum(bool(one.free_meets_truth) for one in planned)
+    blind, guarded = (
+        sum(phase in one.meets_truth for one in planned) for phase in ("transfer", "enter")
+    )
     refused = Counter[str]()
     for one in found:
         refused.update(one.refused)
@@ -266,6 +275,7 @@ def report(found: list[Found]) -> Table:
         ("runs beyond a limit", _share(sum(bool(o.beyond_limits) for o in planned), len(planned))),
         ("transfers that went round something", f"{sum(one.went_round for one in planned)}"),
         ("free motions that meet the true object", _share(blind, len(planned))),
+        ("guarded ways in that meet it", _share(guarded, len(planned))),
         ("candidates refused for their motion", f"{sum(refused.values())}"),
         ("of them without a reason", f"{sum(n for words, n in refused.items() if not words)}"),
         ("duration of a round, median [s]", f"{np.median([o.duration for o in planned]):.1f}"),

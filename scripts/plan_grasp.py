@@ -24,6 +24,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
@@ -32,16 +33,16 @@ from describe_hand import Options as DescribeOptions
 from describe_hand import describe
 from grasp_ending import Ending, ending, ending_record, grip_of, print_ending
 from grasp_moves import act_motions, from_home, left_at
-from grasp_report import episode_of, print_round, raw_touches
+from grasp_report import belief_record, episode_of, print_round, raw_touches
+from obstacle_file import read_obstacles
 from output_files import require_writable, write_json
 from rich.console import Console
+from worlds import build_world, pose_in, print_object, sensor_in
 
-from estimator.axis import Axis, angle_between, offset_at
+from estimator.axis import angle_between, offset_at
 from estimator.belief import Belief
 from estimator.contact import Contact, Miss, SensorNoise
 from estimator.readers.raw_files import write_raw
-from estimator.readers.raw_sensors import RAW_SENSORS
-from estimator.records import estimate_record
 from estimator.sensors import sensor_noise
 from estimator.surface import SurfaceOfRevolution
 from hand_models import HandError, load_hand
@@ -49,17 +50,17 @@ from hand_models.hand import Hand
 from planner.explore import Step, explore
 from planner.goal import Goal
 from planner.grasp import Friction, GraspOptions
-from planner.messages import plan_document, step_record
+from planner.messages import plan_document
 from planner.options import PlannerOptions
 from planner.plan import NoPlan, Probe
 from planner.workspace import Workspace
 from sim_sensor.camera import coarse_view
-from sim_sensor.feeling import Sense
-from sim_sensor.noise import Session, simulated_sensor
 from sim_sensor.objects import load_object
-from sim_sensor.raw_sense import raw_sense
 from sim_sensor.view import write_page
 from sim_sensor.world import World
+
+if TYPE_CHECKING:
+    from sim_sensor.mujoco_world import MujocoWorld
 
 
 @dataclass(frozen=True)
@@ -72,10 +73,12 @@ class Options:
     """Instead of all this, propose a description of the hand in this URDF or MJCF, into --out."""
     object: str = "can"
     """What is touched: a built-in name (can, bottle, cone, cup, barrel, jar-lid, knob, vase, egg,
-    spindle, paper-lathe, sphere) or a CSV file with columns r_mm,z_mm."""
+    spindle, paper-lathe, sphere), a CSV file (r_mm,z_mm), a product's JSON or a mesh (stl, obj)."""
     sensor: str = "gel"
     """Tactile sensor. Readings with noise: ideal, fearing1988, robotworld, taxel, gel, gel-good,
     gel-poor. Raw signals, simulated and read: fearing-strain, gel-depth, taxel-array."""
+    world: str = "own"
+    """own, or MuJoCo with gel-depth pads, the object held (mujoco) or on a table (mujoco-table)."""
     prior_angle_deg: float = 15.0
     """How far the camera's axis is off in direction."""
     prior_offset_mm: float = 15.0
@@ -89,6 +92,8 @@ class Options:
     Not given, the arm reaches everywhere."""
     wrist_range_mm: float = 150.0
     """How far from there, along each axis, the arm can go; it turns the hand any way."""
+    obstacles: Path | None = None
+    """A TOML file of a table and boxes that the hand must not meet (scripts/obstacle_file.py)."""
     budget: int = 15
     """Largest number of touches."""
     grasp_heights_mm: tuple[float, float] | None = None
@@ -109,7 +114,7 @@ class Scenario:
     surface: SurfaceOfRevolution
     belief: Belief
     told: SensorNoise
-    world: World
+    world: World | MujocoWorld
     hand: Hand
     goal: Goal
     planner: PlannerOptions
@@ -122,11 +127,13 @@ def main() -> int:
         return describe(DescribeOptions(options.describe_hand, out=options.out))
     console = Console()
     try:
+        options = replace(options, sensor=sensor_in(options.world, options.sensor))
         scenario = _scenario(options)
         require_writable(options.out)
     except (ValueError, HandError) as error:
         print(f"plan_grasp: {error}", file=sys.stderr)
         return 2
+    print_object(console, options.object)
     steps: list[Step] = []
     reason = ""
     try:
@@ -151,8 +158,7 @@ def _scenario(options: Options) -> Scenario:
     if options.seed < 0:
         raise ValueError(f"--seed: expected a number >= 0, got {options.seed}")
     rng = np.random.default_rng(options.seed)
-    upright = Axis([0.5, 0.0, 0.2], [0.2 * rng.normal(), 0.2 * rng.normal(), 1.0])
-    surface = SurfaceOfRevolution(upright, load_object(options.object))
+    surface = SurfaceOfRevolution(pose_in(options.world, rng), load_object(options.object))
     hand = load_hand(options.hand)
     return Scenario(
         surface=surface,
@@ -163,7 +169,7 @@ def _scenario(options: Options) -> Scenario:
             rng=rng,
         ),
         told=sensor_noise(options.sensor),
-        world=World(surface, _mounted(options.sensor, surface, rng), rng=rng),
+        world=build_world(options.world, hand, surface, options.sensor, rng),
         hand=hand,
         goal=Goal(np.deg2rad(options.goal_angle_deg), 1e-3 * options.goal_offset_mm),
         planner=from_home(hand, _planner_options(options)),
@@ -171,23 +177,16 @@ def _scenario(options: Options) -> Scenario:
     )
 
 
-def _mounted(name: str, surface: SurfaceOfRevolution, rng: np.random.Generator) -> Session | Sense:
-    """The sensor that feels the world, raw or at reading level."""
-    if name in RAW_SENSORS:
-        return raw_sense(name, surface, rng=rng)
-    return simulated_sensor(name).session(rng=rng)
-
-
 def _planner_options(options: Options) -> PlannerOptions:
-    """The planner's defaults, within the arm's workspace."""
+    """The planner's defaults, within the arm's workspace, among the obstacles."""
+    reach = replace(PlannerOptions().reach, **read_obstacles(options.obstacles))
     if options.wrist_mm is None:
-        return PlannerOptions()
+        return PlannerOptions(reach=reach)
     if not np.all(np.isfinite(options.wrist_mm)):
         raise ValueError(f"--wrist-mm: expected three finite numbers, got {options.wrist_mm}")
     X_WB = pin.SE3(np.eye(3), 1e-3 * np.array(options.wrist_mm))
     workspace = Workspace(X_WB, 1e-3 * options.wrist_range_mm, np.pi)
-    reach = replace(PlannerOptions().reach, workspace=workspace)
-    return PlannerOptions(reach=reach)
+    return PlannerOptions(reach=replace(reach, workspace=workspace))
 
 
 def _grasp_options(options: Options) -> GraspOptions:
@@ -197,10 +196,10 @@ def _grasp_options(options: Options) -> GraspOptions:
         raise ValueError(f"--grasp-heights-mm: expected low < high, got {heights}")
     if not (np.isfinite(options.friction) and options.friction > 0.0):
         raise ValueError(f"--friction: expected a number > 0, got {options.friction}")
-    default = GraspOptions()
+    default, told = GraspOptions(), _planner_options(options).reach
     return replace(
         default,
-        reach=replace(default.reach, workspace=_planner_options(options).reach.workspace),
+        reach=replace(default.reach, workspace=told.workspace, table=told.table, boxes=told.boxes),
         heights=None if heights is None else (1e-3 * heights[0], 1e-3 * heights[1]),
         friction=Friction(options.friction),
     )
@@ -237,8 +236,9 @@ def _conclude(
     belief = steps[-1].after if steps else scenario.belief
     unconfirmed = steps[-1].surprise if steps else None
     met = scenario.goal.met_by(belief) and unconfirmed is None
-    truth = scenario.surface.axis
-    middle = truth.point + np.mean(scenario.surface.profile.z_range) * truth.direction
+    surface = scenario.world.surface
+    truth = surface.axis
+    middle = truth.point + np.mean(surface.profile.z_range) * truth.direction
     error = {
         "angle_deg": float(np.rad2deg(angle_between(belief.axis, truth))),
         "offset_mm": 1e3 * offset_at(belief.axis, truth, middle),
@@ -253,22 +253,19 @@ def _conclude(
     if met:
         with console.status("planning the grasp ..."):
             grasp = replace(scenario.grasp, start=left_at(steps, scenario.planner.start))
-            end = ending(scenario.hand, belief, scenario.surface, grasp, rng=rng)
+            end = ending(scenario.hand, belief, surface, grasp, rng=rng)
         print_ending(console, end)
     result = {
         "goal_met": met,
         "reason": reason,
-        "verdict": belief.estimate.verdict if belief.estimate else "undetermined",
-        "touches": steps[-1].touches if steps else 0,
-        "estimate": estimate_record(belief.estimate) if belief.estimate else None,
-        "covariance": belief.covariance.tolist(),
+        **belief_record(belief, steps),
         "truth": {
             "axis": {"point": truth.point.tolist(), "direction": truth.direction.tolist()},
             "object": options.object,
+            "world": options.world,
         },
         "error": error,
         "goal": {"angle_deg": options.goal_angle_deg, "offset_mm": options.goal_offset_mm},
-        "rounds": [step_record(step) for step in steps],
         "grasp": ending_record(end),
     }
     plans = plan_document(scenario.hand, [step.plan for step in steps], end.grasp)
@@ -277,7 +274,7 @@ def _conclude(
         if steps:
             words = f"{error['angle_deg']:.2f} deg and {error['offset_mm']:.2f} mm from the truth"
             episode = episode_of(
-                scenario.surface, scenario.world, steps, words, options.sensor,
+                surface, scenario.world, steps, words, options.sensor,
                 grip_of(scenario.hand, end),
                 partial(act_motions, scenario.hand, scenario.planner.limits),
             )  # fmt: skip

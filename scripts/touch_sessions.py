@@ -23,20 +23,24 @@ from scenarios import draw_shapes
 
 from estimator.axis import Axis, angle_between, offset_at, to_chart
 from estimator.band import ProfileBand
-from estimator.belief import Belief, update
+from estimator.belief import Belief, SampledObjects, update
 from estimator.contact import Contact, Miss, SensorNoise
 from estimator.profile import SplineProfile
 from estimator.readings import UMBILIC
 from estimator.sensors import sensor_noise
 from estimator.singular import margins, placed_triples
 from estimator.surface import SurfaceOfRevolution
-from estimator.vectors import frozen
+from estimator.vectors import Index, frozen
 from hand_models import load_hand
 from hand_models.hand import Hand
+from planner.candidates import Candidates
+from planner.choice import Ranking
 from planner.explore import Step, explore
 from planner.goal import Goal
 from planner.options import Criterion, PlannerOptions
-from planner.plan import NoPlan, Probe, plan_probes
+from planner.plan import NoPlan, Preference, Probe, plan_preferred, plan_probes
+from planner.prospects import prospects
+from planner.worth import Worth
 from sim_sensor.camera import coarse_view
 from sim_sensor.noise import Session as SensorSession
 from sim_sensor.noise import simulated_sensor
@@ -72,11 +76,11 @@ class Outcome:
 
     Args:
         first_deg, first_mm: After the first placement.
-        labels, labels_soon: Whether all labels were right then, and after one more touch where
-            the first placement left them in doubt.
+        labels, labels_soon: Whether three contacts' labels were right then, and if not, after the
+            next touch or placement.
         margin: Of the first three contacts on the true object, from the nearest singularity [-].
         second_deg, second_mm: After a second placement of three.
-        touches: Until the goal was met, or all there were.
+        touches, placements: Until the goal was met, or all there were.
         met, verdict, wrong: How the session ended; wrong where it was determined and beyond four
             standard deviations or twice the goal.
         plan_seconds: Of the first plan.
@@ -92,6 +96,7 @@ class Outcome:
     second_deg: float = np.nan
     second_mm: float = np.nan
     touches: int = 0
+    placements: int = 0
     met: bool = False
     verdict: str = "undetermined"
     wrong: bool = False
@@ -151,11 +156,11 @@ class _Session:
             for step in self._steps(belief, rng):
                 if outcome.touches == 0:
                     outcome = self._after_first(outcome, step, time.perf_counter() - start)
-                elif outcome.touches <= 3 and len(step.outcomes) == 1:
+                elif outcome.placements == 1 and not outcome.labels:
                     outcome = replace(outcome, labels_soon=self._labels_right(step.after))
                 outcome = self._ended(outcome, step)
         except NoPlan as error:
-            outcome = replace(outcome, why=outcome.why or str(error))
+            outcome = replace(outcome, why=str(error))
         return outcome
 
     def _steps(self, belief: Belief, rng: np.random.Generator) -> Iterator[Step]:
@@ -163,10 +168,11 @@ class _Session:
         options = PlannerOptions(criterion=ARMS[self.job.arm], certify=False)
         hand = _hand(self.job.hand)
         if self.job.arm == "oracle":
-            known = replace(options, placements=ORACLE_PLACEMENTS)
-            plan = plan_probes(
-                hand, _right(belief, self.surface), self.told, goal=GOAL, rng=rng, options=known
-            )
+            plan = plan_preferred(
+                hand, _right(belief, self.surface), self.told, (3, 2, 1), goal=GOAL, rng=rng,
+                options=replace(options, placements=ORACLE_PLACEMENTS),
+                prefer=_knowing(self.surface, belief, self.told),
+            )  # fmt: skip
             felt = tuple(self._touch(probe) for probe in plan.probes)
             yield Step(plan, felt, belief, update(belief, felt), len(felt))
             return
@@ -221,7 +227,8 @@ class _Session:
         met = GOAL.met_by(after)
         twice = angle > np.rad2deg(2.0 * GOAL.angle) or offset > 2e3 * GOAL.offset
         return replace(
-            outcome, touches=step.touches, met=met, verdict=verdict,
+            outcome, touches=step.touches, placements=outcome.placements + 1, met=met,
+            verdict=verdict,
             wrong=verdict == "determined" and (far or (met and twice)),
             why="" if met else GOAL.missing(after),
         )  # fmt: skip
@@ -255,6 +262,23 @@ def label_right(record: TouchRecord, row_0: float) -> bool:
         return True
     nearer = int(np.argmax(np.abs(record.outcome.directions @ record.truth.k_theta)))
     return bool((row_0 > 0.5) == (nearer == 0))
+
+
+def _knowing(surface: SurfaceOfRevolution, before: Belief, told: SensorNoise) -> Preference:
+    """Candidates by the error they leave on the true object, from what was known before."""
+    low, high = surface.profile.z_range
+    z = np.linspace(low, high, _NODES)
+    radii = surface.profile.derivatives(z)[0][None]
+    truth = SampledObjects(surface.axis.point[None], surface.axis.direction[None], z, radii)
+    worth = Worth(before, truth, told, GOAL)
+
+    def prefer(candidates: Candidates, ranking: Ranking) -> Index:
+        place = surface.at(candidates.theta, candidates.z)
+        after = worth.covariances(prospects(truth, place.p, place.n))[0]
+        error = np.trace(after, axis1=1, axis2=2)
+        return np.asarray(ranking.order[np.argsort(error[ranking.order])])
+
+    return prefer
 
 
 def _right(belief: Belief, surface: SurfaceOfRevolution) -> Belief:

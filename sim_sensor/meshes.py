@@ -13,6 +13,7 @@ from estimator.surface import SurfaceOfRevolution
 from estimator.vectors import Array, basis_across, frozen
 from hand_models.geometry import vertices
 from sim_sensor.episode import CHI2_95_OF_2, BelievedAxis
+from sim_sensor.scanned import wall_points
 
 LARGEST_TUBE = 0.09  # wider would hide everything else [m]
 
@@ -34,7 +35,7 @@ def lathe_mesh(surface: SurfaceOfRevolution, *, rings: int = 64, segments: int =
     """The true object with its two caps, in the world."""
     z = np.linspace(*surface.profile.z_range, rings)
     theta = np.linspace(0.0, 2.0 * np.pi, segments, endpoint=False)
-    wall = surface.at(theta, z[:, None]).p.reshape(-1, 3)
+    wall = wall_points(surface, theta, z[:, None]).reshape(-1, 3)
     ends = surface.axis.point + np.outer(z[[0, -1]], surface.axis.direction)
     around = np.arange(segments)
     nxt = np.roll(around, -1)

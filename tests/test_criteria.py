@@ -81,14 +81,16 @@ def test_peers_refuse_nothing(criterion):
     assert result.rejected == ()
 
 
-def test_information_has_the_least_expected_error_up_to_the_pairs_share():
+def test_information_has_the_least_expected_error_up_to_what_else_it_charges():
+    """The pair's bound, misses and chances of a singular triple cost it less than a tenth here."""
     candidates = random_placements()
     result = ranked(candidates, "information")
     kept = result.margin >= 0.08
     assert result.value[result.order[0]] < 1.2 * result.value[kept].min()
     others = [ranked(candidates, c) for c in ("pair-bound", "uniform")]
     for other in others:
-        assert result.value[result.order[0]] <= other.value[other.order[0]]
+        assert result.value[result.order[0]] <= 1.1 * other.value[other.order[0]]
+        assert result.cost[result.order[0]] <= result.cost[other.order[0]]
 
 
 def test_d_optimal_does_not_ask_what_the_goal_is():

@@ -18,11 +18,13 @@ from planner.goal import Goal
 from planner.options import PlannerOptions
 from planner.plan import plan_probes
 from planner.reach_task import ReachOptions
+from planner.round_motion import plan_round
 from planner.solid import RevolvedSolid, believed_solid
 from planner.surroundings import OBJECT, Box, object_body
 from planner.timing import PAUSE, STEP, MotionLimits, timed, travel
 from planner.trajectory import Configuration, between
 from planner.transfer import movable_among, plan_transfer
+from planner.workspace import Workspace
 
 AXIS = Axis(np.array([0.5, 0.0, 0.2]), np.array([0.1, -0.1, 1.0]))
 HAND = load_hand("allegro_right")
@@ -135,6 +137,21 @@ def test_the_same_arguments_give_the_same_motion(trajectories):
 
 def test_without_a_place_to_start_from_no_motion_is_planned():
     assert made(None).motion is None
+
+
+def test_a_base_that_is_fixed_stays_and_the_joints_lead_to_the_object(plan):
+    X_WB = plan.reach.X_WB
+    fixed = ReachOptions(workspace=Workspace(X_WB))
+    movable = movable_among(HAND, COLLISION, believed_solid(BELIEF.surface), fixed, LIMITS)
+    approaches = [probe.approach for probe in plan.probes]
+    opened = np.clip(HAND.middle - 0.2, HAND.lower, HAND.upper)
+    found = plan_round(movable, approaches, [plan.retreat], Configuration(opened, X_WB))
+    assert found.enter is None
+    assert found.leave is None
+    assert found.certificate.faults == ()
+    for one in found.trajectories:
+        assert all(X.isApprox(X_WB, 1e-9) for X in one.bases)
+    assert near(found.transfer.end, Configuration(plan.reach.q_standoff, X_WB))
 
 
 def raw_meshes_meet(q, X_WB, boxes):

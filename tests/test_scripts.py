@@ -45,6 +45,22 @@ def test_plan_json_has_joint_angles_by_name_and_an_approach_for_each_probe(main_
             assert len(probe["approach"]["tip_path"]) == len(path)
 
 
+def test_plan_json_has_all_motions_in_time_and_the_contacts_that_end_them(main_job):
+    _, out = main_job
+    plan = json.loads((out / "plan.json").read_text())
+    for placed in (*plan["rounds"], plan["grasp"]):
+        assert placed["motion"]["certificate"]["joint_limit_margin"] >= 0.0
+        for one in placed["motion"]["trajectories"]:
+            assert len(one["times"]) == len(one["joint_positions"]) == len(one["joint_velocities"])
+            assert one["times"][0] == 0.0
+            assert len(one["base_poses"]) in (1, len(one["times"]))
+    told = [one for placed in plan["rounds"] for one in placed["motion"]["trajectories"]]
+    touches = [one["event"] for one in told if one["phase"] == "approach"]
+    names = [probe["finger"] for placed in plan["rounds"] for probe in placed["probes"]]
+    assert [event["contact_of"] for event in touches] == [[name] for name in names]
+    assert all(event["expected_time"] > 0.0 for event in touches)
+
+
 def test_a_goal_out_of_budget_ends_with_one_and_says_why(tmp_path):
     done = script("plan_grasp", "--goal-angle-deg", 0.01, "--budget", 3, "--out", tmp_path)
     assert done.returncode == 1, done.stderr
