@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from hand_models.description import HandError, known_hands
+from hand_models.description import known_hands
+from hand_models.fields import HandError
 from hand_models.hand import Finger, Hand, HandPose, load_hand
 from hand_models.symbolic import (
     symbolic_frames,

@@ -9,9 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from hand_models.hand import Hand
+from hand_models.joints import JointMotion, joint_motions
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -45,12 +47,17 @@ def batch_placements(hand: Hand, q: Array) -> BatchPlacements:
     Args:
         q: (N, nq) joint positions [rad], [m] if prismatic.
     """
-    n, count = len(q), hand.model.njoints
+    return model_placements(hand.model, q)
+
+
+def model_placements(model: pin.Model, q: Array) -> BatchPlacements:
+    """The same for any model of joints with one degree of freedom, in its universe."""
+    n, count = len(q), model.njoints
     R = np.broadcast_to(np.eye(3), (n, count, 3, 3)).copy()
     p = np.zeros((n, count, 3))
-    for j in range(1, count):  # parents come before children
-        parent, fixed = int(hand.model.parents[j]), hand.model.jointPlacements[j]
-        turn, shift = _screw(hand, j, q[:, hand.model.joints[j].idx_q])
+    for j, motion in enumerate(joint_motions(model), start=1):  # parents before children
+        parent, fixed = int(model.parents[j]), model.jointPlacements[j]
+        turn, shift = _moved(motion, motion.at(q))
         R_fixed = R[:, parent] @ fixed.rotation
         R[:, j] = R_fixed @ turn
         p[:, j] = (
@@ -61,17 +68,9 @@ def batch_placements(hand: Hand, q: Array) -> BatchPlacements:
     return BatchPlacements(R, p)
 
 
-def _screw(hand: Hand, joint: int, angle: Array) -> tuple[Array, Array]:
+def _moved(motion: JointMotion, angle: Array) -> tuple[Array, Array]:
     """Rotation (N, 3, 3), by Rodrigues' formula, and translation (N, 3) of one joint's motion."""
-    v, w = joint_screw(hand, joint)
+    w = motion.angular
     K = np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
     s, c = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
-    return np.eye(3) + s * K + (1.0 - c) * (K @ K), angle[:, None] * v
-
-
-def joint_screw(hand: Hand, joint: int) -> tuple[Array, Array]:
-    """Linear (3,) and angular (3,) velocity of a joint in its own frame, per unit velocity."""
-    data = hand.model.joints[joint].createData()
-    hand.model.joints[joint].calc(data, np.zeros(1))
-    v, w = np.split(np.asarray(data.S, dtype=np.float64).ravel(), 2)
-    return v, w
+    return np.eye(3) + s * K + (1.0 - c) * (K @ K), angle[:, None] * motion.linear

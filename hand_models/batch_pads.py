@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hand_models.batch import Array, batch_placements, joint_screw
+from hand_models.batch import Array, batch_placements
 from hand_models.geometry import pad_in_joint
 from hand_models.hand import Hand
+from hand_models.joints import joint_motions
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,14 +35,16 @@ def batch_pads(hand: Hand, q: Array) -> BatchPads:
     centre = placements.points(joints, centres)
     moves = np.zeros((*centre.shape, q.shape[1]))
     turns = np.zeros_like(moves)
+    motions = joint_motions(hand.model)
     for pad, finger in enumerate(hand.fingers):
-        for name, column in zip(finger.joints, finger.q_indices, strict=True):
-            joint = hand.model.getJointId(name)
-            v, w = joint_screw(hand, joint)
+        tip = hand.model.frames[finger.tip_frame_id].parentJoint
+        for joint in [int(j) for j in hand.model.supports[tip]][1:]:
+            motion = motions[joint - 1]
             R = placements.rotations[:, joint]
             arm = centre[:, pad] - placements.positions[:, joint]
-            turns[:, pad, :, column] = R @ w
-            moves[:, pad, :, column] = np.cross(R @ w, arm) + R @ v
+            w, v = R @ motion.angular, R @ motion.linear
+            turns[:, pad, :, motion.q_index] += motion.multiplier * w
+            moves[:, pad, :, motion.q_index] += motion.multiplier * (np.cross(w, arm) + v)
     return BatchPads(centre, placements.vectors(joints, normals), moves, turns)
 
 

@@ -1,15 +1,17 @@
 """The final check: exact distances between convex hulls, by coal.
 
-Every visual mesh is replaced by its convex hull and every pad by its sphere; what a tip's mesh
-shows inside the pad's sphere is dropped, so that a tip is round where it touches. The optimiser
-works on other shapes (`hand_models.spheres`), so this check is independent of it.
+Every visual mesh is replaced by its convex hull. Towards an object every pad is its sphere, and
+what a tip's mesh shows inside that sphere is dropped, so that a tip is round where it touches.
+Towards other links a tip is its whole hull: a sphere that fits the front of a slim tip stands out
+of its sides. The optimiser works on other shapes (`hand_models.spheres`), so this check is
+independent of it.
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import pairwise
 
 import coal
@@ -18,12 +20,11 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from hand_models.bodies import Body
-from hand_models.geometry import link_points, pad_in_joint
-from hand_models.hand import Hand, HandError
+from hand_models.collision_shapes import convex_hull, shapes_of
+from hand_models.hand import Hand
 
 Array = NDArray[np.float64]
 
-_HULL_OPTIONS = "Qt"  # qhull must triangulate, or coal cuts faces of more than three corners short
 _SIDES = 64  # of the polygon that stands for a parallel
 
 
@@ -65,9 +66,11 @@ class HandCollision:
 
     def __init__(self, hand: Hand) -> None:
         self.hand = hand
-        self._shapes, self._pad_ids = _shapes_and_pairs(hand)
+        shapes = shapes_of(hand)
+        self._shapes, self._outer, self._pad_ids = shapes.model, shapes.outer, shapes.pads
         self._data = hand.model.createData()
         self._shape_data = pin.GeometryData(self._shapes)
+        _start_afresh(self._shape_data)
         self._geometries = [shape.geometry for shape in self._shapes.geometryObjects]
         self._placed: tuple[Array, list[coal.Transform3s]] | None = None
 
@@ -84,8 +87,10 @@ class HandCollision:
         return tuple(self._named(k, float(distances[k])) for k in order)
 
     def self_clearance(self, q: ArrayLike) -> LinkPair:
-        """The two links nearest to each other."""
+        """The two links nearest to each other; none, infinitely far, where no two could meet."""
         distances = self._self_distances(q)
+        if len(distances) == 0:
+            return LinkPair("", "", np.inf)
         nearest = int(np.argmin(distances))
         return self._named(nearest, float(distances[nearest]))
 
@@ -105,10 +110,12 @@ class HandCollision:
             X_WO: Pose of the object.
         """
         placed, there = self._placements(q), _transform(X_WB.inverse() * X_WO)
-        distances = np.array([self._distance(i, placed, slices, there) for i in range(len(placed))])
-        links = [i for i in range(self._shapes.ngeoms) if i not in self._pad_ids]
-        names = tuple(self._link(i) for i in links)
-        return ObjectClearance(names, distances[links], distances[list(self._pad_ids)])
+        links = [i for i in self._outer if i not in self._pad_ids]
+        distances, pads = (
+            np.array([self._distance(i, placed, slices, there) for i in ids])
+            for ids in (links, self._pad_ids)
+        )
+        return ObjectClearance(tuple(self._link(i) for i in links), distances, pads)
 
     def nearest_to(
         self, q: ArrayLike, X_WB: pin.SE3, body: Body, *, touching: Collection[str] = ()
@@ -126,9 +133,7 @@ class HandCollision:
         exempt = {i for i, finger in pads if finger.name in touching}
         around = body.parts if body.around is None else (body.around,)
         bounds = [
-            (self._distance(i, placed, around, there), i)
-            for i in range(len(placed))
-            if i not in exempt
+            (self._distance(i, placed, around, there), i) for i in self._outer if i not in exempt
         ]
         least, nearest = min(bounds)
         if body.around is not None:
@@ -208,82 +213,19 @@ def revolved_slices(z: ArrayLike, r: ArrayLike) -> tuple[coal.ConvexBase, ...]:
     reach = 0.5 * (1.0 + 1.0 / np.cos(np.pi / _SIDES))  # between in- and circumscribed
     circle = reach * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     rings = [np.column_stack([a * circle, np.full(_SIDES, b)]) for a, b in zip(r, z, strict=True)]
-    return tuple(_hull(np.vstack(pair)) for pair in pairwise(rings))
+    return tuple(convex_hull(np.vstack(pair)) for pair in pairwise(rings))
 
 
-@lru_cache(maxsize=8)
-def _shapes_and_pairs(hand: Hand) -> tuple[pin.GeometryModel, tuple[int, ...]]:
-    """What takes tens of milliseconds and is only read afterwards."""
-    shapes, pad_ids = _convex_shapes(hand)
-    for i, j in _pairs(hand.model, shapes):
-        shapes.addCollisionPair(pin.CollisionPair(i, j))
-    return shapes, pad_ids
-
-
-def _convex_shapes(hand: Hand) -> tuple[pin.GeometryModel, tuple[int, ...]]:
-    """Hulls and pad spheres as a geometry model, and the ids of the pad spheres."""
-    shapes = pin.GeometryModel()
-    pads = [(*pad_in_joint(hand, finger)[:2], finger) for finger in hand.fingers]
-    for index, visual in enumerate(hand.visual_model.geometryObjects):
-        points = link_points(hand, index)
-        for joint, centre, finger in pads:
-            if joint == visual.parentJoint:
-                outside = np.linalg.norm(points - centre, axis=1) > 1.01 * finger.pad_radius
-                points = points[outside]
-        if _is_solid(points):
-            _add(shapes, visual.name, visual.parentJoint, visual.parentFrame, _hull(points))
-    ids = []
-    for joint, centre, finger in pads:
-        sphere = coal.Sphere(finger.pad_radius)
-        at = pin.SE3(np.eye(3), centre)
-        name = f"pad of {finger.name}"
-        ids.append(_add(shapes, name, joint, finger.tip_frame_id, sphere, at))
-    return shapes, tuple(ids)
-
-
-def _add(
-    shapes: pin.GeometryModel,
-    name: str,
-    joint: int,
-    frame: int,
-    geometry: coal.CollisionGeometry,
-    at: pin.SE3 | None = None,
-) -> int:
-    at = pin.SE3.Identity() if at is None else at
-    shape = pin.GeometryObject(name, int(joint), int(frame), at, geometry)
-    return int(shapes.addGeometryObject(shape))
-
-
-def _pairs(model: pin.Model, shapes: pin.GeometryModel) -> list[tuple[int, int]]:
-    joints = [int(shape.parentJoint) for shape in shapes.geometryObjects]
-
-    def near(i: int, j: int) -> bool:
-        """Whether j is i, its parent or its grandparent; the base has no parent but itself."""
-        parent = int(model.parents[i]) if i else 0
-        grandparent = int(model.parents[parent]) if parent else 0
-        return j in (i, parent, grandparent)
-
-    return [
-        (i, j)
-        for i in range(len(joints))
-        for j in range(i + 1, len(joints))
-        if not near(joints[i], joints[j]) and not near(joints[j], joints[i])
-    ]
+def _start_afresh(data: pin.GeometryData) -> None:
+    """Every query from scratch: Pinocchio's default starts from the last answer, and so misses
+    deep overlaps of round hulls, one posture in two thousand on the Allegro hand."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # the old switch overrules the new one
+        for requests in (data.collisionRequests, data.distanceRequests):
+            for request in requests:
+                request.enable_cached_gjk_guess = False
+                request.gjk_initial_guess = coal.GJKInitialGuess.DefaultGuess
 
 
 def _transform(X: pin.SE3) -> coal.Transform3s:
     return coal.Transform3s(X.rotation, X.translation)
-
-
-def _is_solid(points: Array) -> bool:
-    return len(points) > 3 and np.linalg.matrix_rank(points[1:] - points[0], tol=1e-6) == 3
-
-
-def _hull(points: Array) -> coal.ConvexBase:
-    corners = coal.StdVec_Vec3s()
-    for point in points:
-        corners.append(point)
-    try:
-        return coal.Convex.convexHull(corners, True, _HULL_OPTIONS)
-    except RuntimeError as error:
-        raise HandError(f"no convex hull of {len(points)} points: {error}") from error

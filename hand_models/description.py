@@ -1,4 +1,4 @@
-"""Hand descriptions: reading and checking the TOML file that makes a URDF a hand that feels.
+"""Hand descriptions: reading and checking the TOML file that makes a model a hand that feels.
 
 `hands/allegro_right.toml` documents every field. Nothing here knows Pinocchio: a description is
 checked for shape and sense, and its files are found; `hand.load_hand` checks it against the model.
@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import importlib.metadata
 import importlib.resources
-import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,15 +15,29 @@ from importlib.resources.abc import Traversable
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-UNIT_TOLERANCE = 1e-3
-"""A pad normal whose length is off by less was rounded by its writer, and is normalised."""
+from hand_models.fields import (
+    HandError,
+    Vector,
+    numbers,
+    optional_text,
+    positive,
+    refuse_unknown_keys,
+    tables,
+    text,
+    texts,
+    unit_vector,
+    vector,
+)
 
-_HAND_KEYS = {"name", "source", "distribution", "package_directories", "fingers"}
+_SOURCE_KEYS = {"source", "distribution", "package_directories", "base", "without", "fixed"}
+_HAND_KEYS = {*_SOURCE_KEYS, "name", "copies", "arm", "fingers"}
+_ARM_KEYS = {
+    *_SOURCE_KEYS, "prefix", "flange", "position", "rotation_deg", "at", "at_rotation_deg",
+}  # fmt: skip
+_COPY_KEYS = {"prefix", "position", "rotation_deg"}
 _FINGER_KEYS = {"name", "tip_frame", "pad_centre", "pad_normal", "pad_radius"}
-
-
-class HandError(ValueError):
-    """A hand description, or a question to a hand, that cannot be answered; says what would be."""
+_ENDINGS = (".urdf", ".xml")
+_NOWHERE: Vector = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -33,7 +46,7 @@ class FingerDescription:
 
     Attributes:
         name: Unique among the hand's fingers.
-        tip_frame: Name of the URDF link that carries the pad.
+        tip_frame: Name of the link that carries the pad.
         pad_centre: Centre of the pad's sphere, in T [m].
         pad_normal: Unit vector out of the pad, in T.
         pad_radius: Radius of the pad's sphere [m].
@@ -41,9 +54,64 @@ class FingerDescription:
 
     name: str
     tip_frame: str
-    pad_centre: tuple[float, float, float]
-    pad_normal: tuple[float, float, float]
+    pad_centre: Vector
+    pad_normal: Vector
     pad_radius: float
+
+
+@dataclass(frozen=True)
+class SourceDescription:
+    """The part of a model file that is meant.
+
+    Attributes:
+        file: A URDF, or an MJCF if it ends in ".xml"; exists.
+        package_directories: Folders in which the URDF's meshes are looked up.
+        base: The link all else hangs on; None takes the whole.
+        without: Links that are left out, with all that hangs on them.
+        fixed: Joints that are held, and where [rad], [m].
+    """
+
+    file: Path
+    package_directories: tuple[Path, ...]
+    base: str | None
+    without: tuple[str, ...]
+    fixed: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class CopyDescription:
+    """One `[[copies]]` table: the source once more, elsewhere.
+
+    Attributes:
+        prefix: Put before all its names.
+        position: In the hand base B [m].
+        rotation_deg: Roll, pitch, yaw about the fixed axes of B, as in a URDF [deg].
+    """
+
+    prefix: str
+    position: Vector
+    rotation_deg: Vector
+
+
+@dataclass(frozen=True)
+class ArmDescription:
+    """The `[arm]` table: what carries the hand.
+
+    Attributes:
+        source: Where its model comes from.
+        prefix: Put before its names, where they are the hand's, too.
+        flange: The link the hand is mounted on.
+        position, rotation_deg: Of the hand base in the flange [m], [deg].
+        at, at_rotation_deg: Of the arm's root in the world [m], [deg].
+    """
+
+    source: SourceDescription
+    prefix: str
+    flange: str
+    position: Vector
+    rotation_deg: Vector
+    at: Vector
+    at_rotation_deg: Vector
 
 
 @dataclass(frozen=True)
@@ -52,14 +120,16 @@ class HandDescription:
 
     Attributes:
         name: Name of the hand.
-        urdf: The URDF file; exists.
-        package_directories: Folders in which the URDF's meshes are looked up.
+        source: Where its model comes from.
+        copies: Where that stands; empty for once, at the hand base.
+        arm: What carries it; None leaves the hand free.
         fingers: At least one.
     """
 
     name: str
-    urdf: Path
-    package_directories: tuple[Path, ...]
+    source: SourceDescription
+    copies: tuple[CopyDescription, ...]
+    arm: ArmDescription | None
     fingers: tuple[FingerDescription, ...]
 
 
@@ -106,32 +176,39 @@ def _parse(file: Traversable, where: str) -> dict[str, Any]:
 
 
 def _checked(table: Mapping[str, Any], folder: Path, where: str) -> HandDescription:
-    _refuse_unknown_keys(table, _HAND_KEYS, where)
-    source = PurePosixPath(_text(table, "source", where))
-    if source.suffix != ".urdf":
-        raise HandError(f"{where}: source '{source}' must be a .urdf file")
-    if "distribution" in table:
-        folder = _distribution_folder(_text(table, "distribution", where), source, where)
-    urdf = folder / source
-    if not urdf.is_file():
-        raise HandError(f"{where}: source '{urdf}' is not a file")
+    refuse_unknown_keys(table, _HAND_KEYS, where)
     return HandDescription(
-        name=_text(table, "name", where),
-        urdf=urdf,
-        package_directories=_package_directories(table, folder, where),
+        name=text(table, "name", where),
+        source=_source(table, folder, where),
+        copies=_copies(table, where),
+        arm=_arm(table["arm"], folder, f"{where}: arm") if "arm" in table else None,
         fingers=_fingers(table, where),
     )
 
 
-def _package_directories(table: Mapping[str, Any], folder: Path, where: str) -> tuple[Path, ...]:
-    entries = table.get("package_directories", ["."])
-    if not isinstance(entries, list) or not all(isinstance(entry, str) for entry in entries):
-        raise HandError(f"{where}: package_directories must be a list of paths, got {entries!r}")
-    directories = tuple(folder / entry for entry in entries)
+def _source(table: Mapping[str, Any], folder: Path, where: str) -> SourceDescription:
+    source = PurePosixPath(text(table, "source", where))
+    if source.suffix not in _ENDINGS:
+        raise HandError(f"{where}: source '{source}' must be a .urdf file, or an MJCF .xml file")
+    distribution = optional_text(table, "distribution", where)
+    if distribution is not None:
+        folder = _distribution_folder(distribution, source, where)
+    file = folder / source
+    if not file.is_file():
+        raise HandError(f"{where}: source '{file}' is not a file")
+    directories = tuple(
+        folder / entry for entry in texts(table, "package_directories", where, ["."])
+    )
     for directory in directories:
         if not directory.is_dir():
             raise HandError(f"{where}: package directory '{directory}' is not a folder")
-    return directories
+    return SourceDescription(
+        file,
+        directories,
+        optional_text(table, "base", where),
+        tuple(texts(table, "without", where, [])),
+        numbers(table, "fixed", where),
+    )
 
 
 def _distribution_folder(distribution: str, source: PurePosixPath, where: str) -> Path:
@@ -143,7 +220,9 @@ def _distribution_folder(distribution: str, source: PurePosixPath, where: str) -
     try:
         files = importlib.metadata.files(distribution) or []
     except importlib.metadata.PackageNotFoundError as error:
-        raise HandError(f"{where}: distribution '{distribution}' is not installed") from error
+        raise HandError(
+            f"{where}: distribution '{distribution}' is not installed: pip install {distribution}"
+        ) from error
     tail = source.parts
     for file in files:
         if file.parts[-len(tail) :] == tail:
@@ -151,10 +230,40 @@ def _distribution_folder(distribution: str, source: PurePosixPath, where: str) -
     raise HandError(f"{where}: distribution '{distribution}' has no file '{source}'")
 
 
+def _copies(table: Mapping[str, Any], where: str) -> tuple[CopyDescription, ...]:
+    return tuple(
+        _copy(entry, f"{where}: copies[{i}]")
+        for i, entry in enumerate(tables(table, "copies", where))
+    )
+
+
+def _copy(table: Mapping[str, Any], where: str) -> CopyDescription:
+    refuse_unknown_keys(table, _COPY_KEYS, where)
+    return CopyDescription(
+        prefix=text(table, "prefix", where),
+        position=vector(table, "position", where, _NOWHERE),
+        rotation_deg=vector(table, "rotation_deg", where, _NOWHERE),
+    )
+
+
+def _arm(table: object, folder: Path, where: str) -> ArmDescription:
+    if not isinstance(table, dict):
+        raise HandError(f"{where} must be a table, [arm], got {table!r}")
+    refuse_unknown_keys(table, _ARM_KEYS, where)
+    return ArmDescription(
+        source=_source(table, folder, where),
+        prefix=optional_text(table, "prefix", where) or "",
+        flange=text(table, "flange", where),
+        position=vector(table, "position", where, _NOWHERE),
+        rotation_deg=vector(table, "rotation_deg", where, _NOWHERE),
+        at=vector(table, "at", where, _NOWHERE),
+        at_rotation_deg=vector(table, "at_rotation_deg", where, _NOWHERE),
+    )
+
+
 def _fingers(table: Mapping[str, Any], where: str) -> tuple[FingerDescription, ...]:
-    entries = table.get("fingers", [])
-    tables = isinstance(entries, list) and all(isinstance(entry, dict) for entry in entries)
-    if not tables or not entries:
+    entries = tables(table, "fingers", where)
+    if not entries:
         raise HandError(f"{where}: fingers must be one or more [[fingers]] tables")
     fingers = tuple(_finger(entry, f"{where}: fingers[{i}]") for i, entry in enumerate(entries))
     names = [finger.name for finger in fingers]
@@ -165,58 +274,11 @@ def _fingers(table: Mapping[str, Any], where: str) -> tuple[FingerDescription, .
 
 
 def _finger(table: Mapping[str, Any], where: str) -> FingerDescription:
-    _refuse_unknown_keys(table, _FINGER_KEYS, where)
+    refuse_unknown_keys(table, _FINGER_KEYS, where)
     return FingerDescription(
-        name=_text(table, "name", where),
-        tip_frame=_text(table, "tip_frame", where),
-        pad_centre=_vector(table, "pad_centre", where),
-        pad_normal=_unit_vector(table, "pad_normal", where),
-        pad_radius=_positive(table, "pad_radius", where),
+        name=text(table, "name", where),
+        tip_frame=text(table, "tip_frame", where),
+        pad_centre=vector(table, "pad_centre", where),
+        pad_normal=unit_vector(table, "pad_normal", where),
+        pad_radius=positive(table, "pad_radius", where),
     )
-
-
-def _refuse_unknown_keys(table: Mapping[str, Any], allowed: set[str], where: str) -> None:
-    for key in table.keys() - allowed:
-        raise HandError(f"{where}: unknown key '{key}'; allowed are {', '.join(sorted(allowed))}")
-
-
-def _required(table: Mapping[str, Any], key: str, where: str) -> Any:
-    if key not in table:
-        raise HandError(f"{where}: key '{key}' is missing")
-    return table[key]
-
-
-def _text(table: Mapping[str, Any], key: str, where: str) -> str:
-    value = _required(table, key, where)
-    if not isinstance(value, str) or not value:
-        raise HandError(f"{where}: {key} must be a non-empty string, got {value!r}")
-    return value
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-
-
-def _vector(table: Mapping[str, Any], key: str, where: str) -> tuple[float, float, float]:
-    value = _required(table, key, where)
-    if not isinstance(value, list) or len(value) != 3 or not all(map(_is_number, value)):
-        raise HandError(f"{where}: {key} must be three finite numbers, got {value!r}")
-    x, y, z = map(float, value)
-    return x, y, z
-
-
-def _unit_vector(table: Mapping[str, Any], key: str, where: str) -> tuple[float, float, float]:
-    x, y, z = _vector(table, key, where)
-    length = math.hypot(x, y, z)
-    if abs(length - 1.0) > UNIT_TOLERANCE:
-        raise HandError(
-            f"{where}: {key} must be a unit vector to {UNIT_TOLERANCE:g}, its length is {length:g}"
-        )
-    return x / length, y / length, z / length
-
-
-def _positive(table: Mapping[str, Any], key: str, where: str) -> float:
-    value = _required(table, key, where)
-    if not _is_number(value) or value <= 0.0:
-        raise HandError(f"{where}: {key} must be a positive number of metres, got {value!r}")
-    return float(value)

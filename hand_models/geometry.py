@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from itertools import product
+from typing import TYPE_CHECKING
 
 import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from hand_models.hand import Finger, Hand, HandError
+from hand_models.fields import HandError
+
+if TYPE_CHECKING:
+    from hand_models.hand import Finger, Hand
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ p + pad_radius * n, and its normal within the sensor's cone about -n.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -16,8 +16,19 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from hand_models.description import FingerDescription, HandError, known_hands, read_description
-from hand_models.urdf import read_urdf
+from hand_models.arm import Arm
+from hand_models.assembly import assembled, mounted, placed
+from hand_models.description import (
+    ArmDescription,
+    FingerDescription,
+    known_hands,
+    read_description,
+)
+from hand_models.fields import HandError
+from hand_models.joints import joint_motions
+from hand_models.part import Coupling, Part, coupled, link_id
+from hand_models.pose import HandPose
+from hand_models.sense import check_sense
 
 __all__ = ["Finger", "Hand", "HandError", "HandPose", "known_hands", "load_hand"]
 
@@ -31,7 +42,8 @@ class Finger:
 
     Attributes:
         name: E.g. "index".
-        joints: Names of the joints that move the tip, from base to tip.
+        joints: Names of the independent joints that move the tip, from base to tip; of a joint
+            that follows another, the one that drives it.
         q_indices: (J,) their indices into q, in the same order.
         tip_frame: Name of the link that carries the pad; its frame is T.
         tip_frame_id: Its index into `model.frames`.
@@ -54,6 +66,9 @@ class Finger:
 class Hand:
     """A hand: kinematics, meshes, fingers. Made by `load_hand`.
 
+    A configuration q holds the independent joints only; joints that follow others (a <mimic> tag)
+    are Pinocchio's mimic joints, and `all_joints` tells where they stand.
+
     Attributes:
         name: Name in its description.
         model: Pinocchio model with fixed base; its universe is the hand base frame B.
@@ -61,6 +76,8 @@ class Hand:
         fingers: In the order of the description.
         lower: (nq,) lower joint limits [rad], [m] for a prismatic joint.
         upper: (nq,) upper joint limits, likewise.
+        arm: What carries it: then B is the arm's root, which stands still, q holds the arm's
+            joints, too, and the fingers' own joints are those of the hand; None for a free hand.
     """
 
     name: str
@@ -69,11 +86,35 @@ class Hand:
     fingers: tuple[Finger, ...]
     lower: Array
     upper: Array
+    arm: Arm | None = None
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Joint names in the order of q. This is Pinocchio's order, not that of the fingers."""
-        return tuple(self.model.names)[1:]
+        """Names of the independent joints in the order of q.
+
+        This is Pinocchio's order, not that of the fingers.
+        """
+        return tuple(str(name) for name, _ in _own_joints(self.model))
+
+    @property
+    def couplings(self) -> tuple[Coupling, ...]:
+        """Joints that follow others."""
+        names = self.joint_names
+        motions = zip(list(self.model.names)[1:], joint_motions(self.model), strict=True)
+        return tuple(
+            Coupling(str(name), names[motion.q_index], motion.multiplier, motion.offset)
+            for name, motion in motions
+            if str(name) not in names
+        )
+
+    def all_joints(self, q: ArrayLike) -> dict[str, float]:
+        """Positions of all joints by name, of those that follow others too [rad], [m]."""
+        values = np.asarray(q, dtype=np.float64)
+        motions = joint_motions(self.model)
+        return {
+            str(name): float(motion.at(values))
+            for name, motion in zip(list(self.model.names)[1:], motions, strict=True)
+        }
 
     @cached_property
     def middle(self) -> Array:
@@ -114,75 +155,6 @@ class Hand:
         return HandPose(self, q, pin.SE3.Identity() if X_WB is None else pin.SE3(X_WB), data)
 
 
-@dataclass(frozen=True, eq=False)
-class HandPose:
-    """A hand in a configuration and a place; to hold one is to know that kinematics ran.
-
-    Made by `Hand.at`.
-
-    Attributes:
-        hand: The hand.
-        q: (nq,) joint positions.
-        X_WB: Pose of the hand base B in the world W.
-        data: Pinocchio data with joint and frame placements and joint Jacobians. Pinocchio's
-            world is B: `data.oMf[i]` is X_BF, not X_WF.
-    """
-
-    hand: Hand
-    q: Array
-    X_WB: pin.SE3
-    data: pin.Data
-
-    def transform_tip_to_world(self, finger: Finger) -> pin.SE3:
-        """X_WT, the pose of the finger's tip frame in the world."""
-        return self.X_WB * self.data.oMf[finger.tip_frame_id]
-
-    @cached_property
-    def pad_centres(self) -> Array:
-        """(F, 3) centres of the pads' spheres in the world, in the order of the fingers [m]."""
-        fingers = self.hand.fingers
-        return _frozen([self.transform_tip_to_world(f).act(f.pad_centre) for f in fingers])
-
-    @cached_property
-    def pad_normals(self) -> Array:
-        """(F, 3) unit vectors out of the pads in the world, in the order of the fingers."""
-        fingers = self.hand.fingers
-        return _frozen([self.transform_tip_to_world(f).rotation @ f.pad_normal for f in fingers])
-
-    def link_axis(self, finger: Finger) -> Array:
-        """(3,) unit vector along the finger's last link in the world: from its last joint to the
-        pad, made perpendicular to the pad's normal. A cylindrical sensor lies along it."""
-        frame = self.hand.model.frames[finger.tip_frame_id]
-        row = self.hand.fingers.index(finger)
-        joint = self.X_WB.act(self.data.oMi[frame.parentJoint].translation)
-        n = self.pad_normals[row]
-        along = self.pad_centres[row] - joint
-        along = along - (along @ n) * n
-        if np.linalg.norm(along) < 1e-6:  # a pad on the tip of the link has no such direction
-            along = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
-        return _frozen(along / np.linalg.norm(along))
-
-    def pad_jacobian(self, finger: Finger) -> Array:
-        """(3, nq) velocity of the pad's centre per joint velocity, world axes, base at rest."""
-        return self._pad_twist(finger)[:3]
-
-    def pad_turn_jacobian(self, finger: Finger) -> Array:
-        """(3, nq) angular velocity of the tip per joint velocity, world axes, base at rest.
-
-        The pad normal n moves with dn/dt = (J dq/dt) x n.
-        """
-        return self._pad_twist(finger)[3:]
-
-    def _pad_twist(self, finger: Finger) -> Array:
-        """(6, nq) velocity of the pad's centre above angular velocity of the tip, world axes."""
-        frame = self.hand.model.frames[finger.tip_frame_id]
-        X_JP = frame.placement * pin.SE3(np.eye(3), finger.pad_centre)  # pad in its joint's frame
-        J_B = pin.getFrameJacobian(
-            self.hand.model, self.data, frame.parentJoint, X_JP, pin.LOCAL_WORLD_ALIGNED
-        )
-        return _frozen(np.kron(np.eye(2), self.X_WB.rotation) @ J_B)
-
-
 def load_hand(name_or_path: str | Path) -> Hand:
     """Load a known hand, or the hand of a TOML description.
 
@@ -191,45 +163,88 @@ def load_hand(name_or_path: str | Path) -> Hand:
             `hands/allegro_right.toml` explains its fields.
 
     Raises:
-        HandError: Unknown hand; a description that is wrong or does not fit its URDF; a URDF with
-            joints that are not independent, limited, revolute or prismatic.
+        HandError: Unknown hand; a description that is wrong or does not fit its model; a model
+            with joints that are not limited, revolute or prismatic, or of a size no hand has.
     """
     description = read_description(name_or_path)
-    model, visual_model = read_urdf(description)
+    try:
+        part = assembled(description)
+        hand = _hand(description.name, coupled(part), description.fingers)
+        check_sense(hand)
+        return hand if description.arm is None else _on_arm(hand, part, description.arm)
+    except HandError as error:
+        raise HandError(f"{description.name}: {error}") from error
+
+
+def _hand(name: str, part: Part, fingers: tuple[FingerDescription, ...]) -> Hand:
     return Hand(
-        name=description.name,
-        model=model,
-        visual_model=visual_model,
-        fingers=tuple(_finger(model, finger, description.name) for finger in description.fingers),
-        lower=_frozen(model.lowerPositionLimit),
-        upper=_frozen(model.upperPositionLimit),
+        name=name,
+        model=part.model,
+        visual_model=part.shapes,
+        fingers=tuple(_finger(part.model, finger) for finger in fingers),
+        lower=_frozen(part.model.lowerPositionLimit),
+        upper=_frozen(part.model.upperPositionLimit),
     )
 
 
-def _finger(model: pin.Model, description: FingerDescription, hand_name: str) -> Finger:
-    links = {f.name: i for i, f in enumerate(model.frames) if f.type == pin.FrameType.BODY}
+def _on_arm(hand: Hand, part: Part, description: ArmDescription) -> Hand:
+    """Arm and hand as one."""
+    arm, whole = mounted(part, description)
+    at = {name: int(joint.idx_q) for name, joint in _own_joints(whole.model)}
+    own = _frozen_indices([at[name] for name in hand.joint_names])
+    fingers = tuple(
+        replace(
+            finger,
+            q_indices=_frozen_indices([at[name] for name in finger.joints]),
+            tip_frame_id=link_id(whole.model, finger.tip_frame),
+        )
+        for finger in hand.fingers
+    )
+    carrier = Arm(
+        hand=hand,
+        model=arm.model,
+        flange_id=link_id(arm.model, description.prefix + description.flange),
+        X_FB=placed(description.position, description.rotation_deg),
+        X_WA=placed(description.at, description.at_rotation_deg),
+        q_indices=_frozen_indices([at[name] for name, _ in _own_joints(arm.model)]),
+        hand_q_indices=own,
+    )
+    lower, upper = whole.model.lowerPositionLimit, whole.model.upperPositionLimit
+    return Hand(
+        hand.name, whole.model, whole.shapes, fingers, _frozen(lower), _frozen(upper), carrier
+    )
+
+
+def _finger(model: pin.Model, description: FingerDescription) -> Finger:
+    where = f"finger '{description.name}'"
+    links = [f.name for f in model.frames if f.type == pin.FrameType.BODY]
     if description.tip_frame not in links:
         raise HandError(
-            f"{hand_name}: finger '{description.name}': the URDF has no link"
-            f" '{description.tip_frame}' for tip_frame; its links are {', '.join(links)}"
+            f"{where}: there is no link '{description.tip_frame}' for tip_frame; links are"
+            f" {', '.join(links)}"
         )
-    tip_frame_id = links[description.tip_frame]
-    supports = [int(j) for j in model.supports[model.frames[tip_frame_id].parentJoint] if j > 0]
-    if not supports:
-        raise HandError(
-            f"{hand_name}: finger '{description.name}': no joint moves tip_frame"
-            f" '{description.tip_frame}'"
-        )
+    tip_frame_id = link_id(model, description.tip_frame)
+    chain = [int(j) for j in model.supports[model.frames[tip_frame_id].parentJoint] if j > 0]
+    if not chain:
+        raise HandError(f"{where}: no joint moves tip_frame '{description.tip_frame}'")
+    drivers = {int(model.joints[j].idx_q): None for j in chain}  # in order, each once
+    names = {int(joint.idx_q): str(name) for name, joint in _own_joints(model)}
     return Finger(
         name=description.name,
-        joints=tuple(model.names[j] for j in supports),
-        q_indices=_frozen_indices([model.joints[j].idx_q for j in supports]),
+        joints=tuple(names[i] for i in drivers),
+        q_indices=_frozen_indices(list(drivers)),
         tip_frame=description.tip_frame,
         tip_frame_id=tip_frame_id,
         pad_centre=_frozen(description.pad_centre),
         pad_normal=_frozen(description.pad_normal),
         pad_radius=description.pad_radius,
     )
+
+
+def _own_joints(model: pin.Model) -> list[tuple[str, pin.JointModel]]:
+    """Names and models of the joints that follow no other, in the order of q."""
+    joints = list(zip(model.names, model.joints, strict=True))[1:]
+    return [(str(name), joint) for name, joint in joints if joint.nq]
 
 
 def _frozen(values: ArrayLike) -> Array:

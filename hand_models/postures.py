@@ -15,7 +15,7 @@ from hand_models.hand import Hand, HandError
 
 Array = NDArray[np.float64]
 
-_VERSION = 1  # of the sampling; part of the cache's key
+_VERSION = 4  # of the sampling and the rules of collision; part of the cache's key
 _FIELDS = ("q", "pad_centres", "pad_normals")
 _DRAWS_PER_POSTURE = 50  # a hand that is free of itself in fewer than 2 % of draws is misdescribed
 

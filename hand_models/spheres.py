@@ -12,7 +12,7 @@ the pad that touches a plane in front of it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,11 +65,15 @@ class LinkSpheres:
 def link_spheres(hand: Hand, *, overhang: float = 3e-3, slack: float = 2e-3) -> LinkSpheres:
     """Cover the hand's visual meshes by spheres; kept in the cache, see `hand_models.cache`.
 
+    An arm that carries the hand is not covered.
+
     Args:
         overhang: How far a sphere may stand out of its link [m].
         slack: How far a link may stand out of its spheres [m]. Their sum sets the count: about
             370 spheres for the Allegro hand at 3 + 2 mm, 600 at 2 + 2 mm.
     """
+    if hand.arm is not None:
+        return _of_hand_on_arm(hand, link_spheres(hand.arm.hand, overhang=overhang, slack=slack))
     key = hand_fingerprint(hand, "spheres", _VERSION, overhang, slack)
     arrays = cached_arrays(f"spheres-{key}", _FIELDS, lambda: _cover_hand(hand, overhang, slack))
     for array in arrays.values():
@@ -85,6 +89,24 @@ def link_spheres(hand: Hand, *, overhang: float = 3e-3, slack: float = 2e-3) -> 
         overhang=overhang,
         slack=slack,
     )
+
+
+def _of_hand_on_arm(hand: Hand, alone: LinkSpheres) -> LinkSpheres:
+    """The spheres of the hand alone, on the joints of the whole; the arm itself has none.
+
+    It is long and rarely near: the final check on hulls sees it.
+    """
+    assert hand.arm is not None
+    names = list(hand.arm.hand.model.names)
+    flange = hand.arm.model.frames[hand.arm.flange_id]
+    X_JB = flange.placement * hand.arm.X_FB  # hand base in the arm's last joint
+    last = hand.model.getJointId(hand.arm.model.names[flange.parentJoint])
+    joints = [int(hand.model.getJointId(names[j])) if j else int(last) for j in alone.joints]
+    centres = alone.centres.copy()
+    on_base = alone.joints == 0
+    centres[on_base] = centres[on_base] @ X_JB.rotation.T + X_JB.translation
+    centres.setflags(write=False)
+    return replace(alone, joints=np.array(joints, dtype=np.int64), centres=centres)
 
 
 def _cover_hand(hand: Hand, overhang: float, slack: float) -> dict[str, NDArray[np.generic]]:

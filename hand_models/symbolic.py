@@ -17,6 +17,7 @@ import numpy as np
 import pinocchio as pin
 
 from hand_models.hand import Hand, HandError
+from hand_models.joints import joint_motion
 
 Placement = tuple[ca.SX, ca.SX]
 
@@ -37,7 +38,7 @@ def symbolic_joint_placements(model: pin.Model, q: ca.SX) -> list[Placement]:
 
     Args:
         model: Revolute, unbounded revolute, prismatic and free-flyer joints, aligned or not, and
-            composites of them.
+            composites of them, and joints that follow a revolute or prismatic one.
         q: (nq, 1) configuration in Pinocchio's order: [rad], [m]; (cos, sin) for an unbounded
             revolute joint; position and unit quaternion (x, y, z, w) for a free-flyer. Off the
             unit circle or sphere the rotations are not rotations; nothing is normalised.
@@ -109,6 +110,8 @@ def _joint_motion(joint: pin.JointModel, q: ca.SX, name: str) -> Placement:
     """Placement of a joint's moving side in its fixed side."""
     kind = joint.shortname()
     q_joint = q[joint.idx_q : joint.idx_q + joint.nq]
+    if kind == "JointModelMimic":
+        return _following_motion(joint, q)
     if kind in _REVOLUTE:
         return _rotation(_axis(joint), ca.cos(q_joint), ca.sin(q_joint)), ca.SX.zeros(3)
     if kind in _UNBOUNDED:
@@ -123,6 +126,14 @@ def _joint_motion(joint: pin.JointModel, q: ca.SX, name: str) -> Placement:
         f"joint '{name}' is a {kind}; symbolic kinematics knows revolute, unbounded revolute,"
         " prismatic, free-flyer and composite joints"
     )
+
+
+def _following_motion(joint: pin.JointModel, q: ca.SX) -> Placement:
+    """Of a joint that another one drives; its constant subspace tells its kind."""
+    motion = joint_motion(joint)
+    position = motion.multiplier * q[motion.q_index] + motion.offset
+    R = _rotation(ca.SX(motion.angular), ca.cos(position), ca.sin(position))
+    return (R if np.any(motion.angular) else ca.SX.eye(3)), ca.SX(motion.linear) * position
 
 
 def _composite_motion(joint: pin.JointModelComposite, q: ca.SX, name: str) -> Placement:

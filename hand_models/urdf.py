@@ -1,64 +1,66 @@
-"""A hand's URDF as a Pinocchio model, refused where the kinematics would not be the hand's."""
+"""A URDF as a Pinocchio part, refused in one line where it is no tree or cannot be read."""
 
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
 
-import numpy as np
 import pinocchio as pin
 
-from hand_models.description import HandDescription, HandError
+from hand_models.description import SourceDescription
+from hand_models.fields import HandError
+from hand_models.part import Coupling, Part
+from hand_models.urdf_tree import keep_what_hangs_on, read_tree
 
 
-def read_urdf(description: HandDescription) -> tuple[pin.Model, pin.GeometryModel]:
-    """Model with fixed base and visual meshes of a description's URDF.
+def read_urdf(source: SourceDescription) -> Part:
+    """Model with fixed base, visual meshes and <mimic> joints of a URDF, from its base link on.
+
+    Pinocchio reads a <mimic> joint as a free one; it is kept as a coupling. Some files name the
+    joint that is followed without the prefix of their hand ("index_q1" for "Right_index_q1"): the
+    nearest joint between it and the root whose name ends so is meant.
 
     Raises:
-        HandError: The URDF or a mesh cannot be read, or a joint is not independent, limited, and
-            revolute or prismatic; names it.
+        HandError: The URDF or a mesh cannot be read, or its links make no tree.
     """
-    _refuse_mimic(description)
+    robot = read_tree(source.file)
+    if source.base is not None:
+        keep_what_hangs_on(robot, source.base)
+    xml = ElementTree.tostring(robot, encoding="unicode")
     # The URDF's own folder last: meshes may be given relative to it.
-    folders = [str(path) for path in (*description.package_directories, description.urdf.parent)]
-    urdf = str(description.urdf)
+    folders = [str(path) for path in (*source.package_directories, source.file.parent)]
     try:
-        model = pin.buildModelFromUrdf(urdf)
-        meshes = pin.buildGeomFromUrdf(model, urdf, pin.GeometryType.VISUAL, package_dirs=folders)
+        model = pin.buildModelFromXML(xml)
+        shapes = pin.buildGeomFromUrdfString(
+            model, xml, pin.GeometryType.VISUAL, package_dirs=folders
+        )
     except (RuntimeError, ValueError) as error:
-        raise _unreadable(description, error) from error
-    _check_joints(model, description)
-    return model, meshes
+        reason = " ".join(str(error).split())
+        raise HandError(f"cannot read '{source.file}': {reason}") from error
+    return Part(model, shapes, _couplings(robot, model))
 
 
-def _refuse_mimic(description: HandDescription) -> None:
-    """Pinocchio would read a coupled joint as a free one, and the kinematics would lie."""
-    try:
-        joints = ElementTree.parse(description.urdf).getroot().iter("joint")
-    except ElementTree.ParseError as error:
-        raise _unreadable(description, error) from error
-    for joint in joints:
-        if joint.find("mimic") is not None:
-            raise HandError(
-                f"{description.name}: joint '{joint.get('name')}' has a <mimic> tag; coupled"
-                " joints are not supported, only independent ones"
+def _couplings(root: ElementTree.Element, model: pin.Model) -> tuple[Coupling, ...]:
+    found = []
+    for joint in root.findall("joint"):
+        mimic = joint.find("mimic")
+        if mimic is not None:
+            name = joint.get("name", "")
+            found.append(
+                Coupling(
+                    name,
+                    _followed(model, name, mimic.get("joint", "")),
+                    float(mimic.get("multiplier", "1")),
+                    float(mimic.get("offset", "0")),
+                )
             )
+    return tuple(found)
 
 
-def _unreadable(description: HandDescription, error: Exception) -> HandError:
-    reason = " ".join(str(error).split())
-    return HandError(f"{description.name}: cannot read '{description.urdf}': {reason}")
-
-
-def _check_joints(model: pin.Model, description: HandDescription) -> None:
-    for name, joint in zip(list(model.names)[1:], list(model.joints)[1:], strict=True):
-        if (joint.nq, joint.nv) != (1, 1):
-            raise HandError(
-                f"{description.name}: joint '{name}' is a {joint.shortname()}; a hand's joints"
-                " must be revolute or prismatic, with limits"
-            )
-        lower, upper = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
-        if not (np.isfinite([lower, upper]).all() and lower < upper):
-            raise HandError(
-                f"{description.name}: joint '{name}' has limits {lower:g} to {upper:g}; they must"
-                " be finite, the lower below the upper"
-            )
+def _followed(model: pin.Model, joint: str, follows: str) -> str:
+    if model.existJointName(follows):
+        return follows
+    chain = [str(model.names[int(j)]) for j in model.supports[model.getJointId(joint)]][1:-1]
+    for name in reversed(chain):
+        if follows and name.endswith(follows):
+            return name
+    raise HandError(f"joint '{joint}' has a <mimic> of '{follows}', and there is no such joint")

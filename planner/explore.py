@@ -96,7 +96,7 @@ def _moved(options: PlannerOptions, plan: Plan) -> PlannerOptions:
     """The options for the next placement: the hand is where the last left it."""
     if plan.motion is None:
         return options
-    return replace(options, start=Configuration(plan.retreat.q, plan.retreat.bases[-1]))
+    return replace(options, start=Configuration(plan.retreat.path[-1], plan.retreat.bases[-1]))
 
 
 def _plan(

@@ -12,7 +12,7 @@ from estimator.profile import Profile
 from estimator.surface import SurfaceOfRevolution
 from estimator.vectors import Array, frozen
 from hand_models.hand import Hand
-from planner.candidates import Candidates, placement_candidates
+from planner.candidates import Candidates
 from planner.closing import Bodies, bodies_of, body_of
 from planner.funnel import Funnel
 from planner.grasp_hold import CLOSED, Closings, Friction, holds
@@ -131,13 +131,8 @@ def _with_fingers(
 ) -> tuple[list[_Ranked], Funnel]:
     if count > len(tools.hand.fingers):
         raise ValueError(f"fingers: {tools.hand.name} has {len(tools.hand.fingers)}, not {count}")
-    laid = placement_candidates(
-        tools.reach_map,
-        _bounded(surface, options.heights),
-        workspace=options.reach.workspace,
-        count=options.placements,
-        rng=rng,
-        fingers_at_once=count,
+    laid = tools.candidates(
+        _bounded(surface, options.heights), count, count=options.placements, rng=rng
     )
     if len(laid) == 0:
         return [], laid.rejected

@@ -2,33 +2,108 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
+import numpy as np
+
+from estimator.belief import Belief
+from estimator.surface import SurfaceOfRevolution
+from hand_models.arm import Arm
 from hand_models.collision import HandCollision
 from hand_models.hand import Hand
 from hand_models.postures import Postures, posture_library
 from hand_models.spheres import LinkSpheres, link_spheres
-from planner.reach import ReachSolver
+from planner.arm_reach import ArmReach
+from planner.candidates import Candidates, placement_candidates, single_candidates
+from planner.reach import Reach, ReachSolver
 from planner.reach_map import ReachMap
 from planner.reach_task import ReachOptions
+from planner.retreat import Retreat, ways_out
+from planner.workspace import Workspace
 
 
 @dataclass(frozen=True, eq=False)
 class HandTools:
-    """One hand's library of postures, shapes, map of what it reaches, and optimiser."""
+    """One hand's library of postures, shapes, map of what it reaches, and optimiser.
+
+    Where an arm carries the hand, placements are found for the hand alone and handed on to the
+    arm: `postures` and `reach_map` are of the hand alone, all else is of the whole.
+
+    Attributes:
+        rules: Of reach; with an arm, its root stands still.
+        solver: For fingers that move while the base, or the arm, is held.
+        single: For one finger that the arm brings along; its joints are the finger's, too. The
+            same as `solver` for a free hand.
+        arm: What the arm reaches; None for a free hand.
+    """
 
     hand: Hand
+    rules: ReachOptions
     postures: Postures
     spheres: LinkSpheres
     collision: HandCollision
     reach_map: ReachMap
     solver: ReachSolver
+    single: ReachSolver
+    arm: ArmReach | None
+
+    def candidates(
+        self, surface: SurfaceOfRevolution, fingers: int, *, count: int, rng: np.random.Generator
+    ) -> Candidates:
+        """About so many placements with so many fingers on the surface, brought by the arm."""
+        workspace = self.rules.workspace if self.arm is None else self.arm.around
+        if fingers == 1:
+            laid = single_candidates(
+                self.reach_map, surface, workspace=workspace, count=count, rng=rng
+            )
+        else:
+            laid = placement_candidates(
+                self.reach_map, surface, workspace=workspace, count=count, rng=rng,
+                fingers_at_once=fingers,
+            )  # fmt: skip
+        return laid if self.arm is None else self.arm.placements(laid)
+
+    def ways_out(self, belief: Belief, reach: Reach) -> tuple[Retreat, ...]:
+        """Of the whole, from a reach's stand-off; a free hand's base is the reach's there."""
+        q, carrier = reach.q_standoff, self.hand.arm
+        if self.arm is None or carrier is None:
+            return ways_out(self.hand, self.spheres, belief, q, reach.X_WB, reach.normals)
+        X_WB, q_hand = carrier.base_of_hand(q), q[carrier.hand_q_indices]
+        alone = self.reach_map
+        ways = ways_out(alone.hand, alone.spheres, belief, q_hand, X_WB, reach.normals)
+        brought = [self.arm.retreat(q, way) for way in ways]
+        return tuple(sorted(brought, key=lambda way: -min(way.clearance, way.wanted)))
 
 
 @lru_cache(maxsize=8)
 def hand_tools(hand: Hand, options: ReachOptions) -> HandTools:
     """The tools of a hand under these rules; equal arguments give the same object."""
-    postures, spheres, collision = posture_library(hand), link_spheres(hand), HandCollision(hand)
-    reach_map = ReachMap(hand, postures, spheres, collision, cone=options.cone)
-    return HandTools(hand, postures, spheres, collision, reach_map, ReachSolver(hand, options))
+    alone = hand if hand.arm is None else hand.arm.hand
+    postures, spheres, collision = posture_library(alone), link_spheres(alone), HandCollision(alone)
+    reach_map = ReachMap(alone, postures, spheres, collision, cone=options.cone)
+    if hand.arm is None:
+        solver = ReachSolver(hand, options)
+        return HandTools(
+            hand, options, postures, spheres, collision, reach_map, solver, solver, None
+        )
+    rules = replace(options, workspace=Workspace(hand.arm.X_WA))
+    solver, single = ReachSolver(hand, rules), ReachSolver(_with_arm(hand, hand.arm), rules)
+    return HandTools(
+        hand, rules, postures, link_spheres(hand), HandCollision(hand), reach_map,
+        solver, single, ArmReach(hand.arm),
+    )  # fmt: skip
+
+
+def _with_arm(hand: Hand, arm: Arm) -> Hand:
+    """The same hand, the arm's joints counted with each finger's."""
+    names = tuple(hand.joint_names[i] for i in arm.q_indices)
+    fingers = tuple(
+        replace(
+            finger,
+            joints=names + finger.joints,
+            q_indices=np.concatenate([arm.q_indices, finger.q_indices]),
+        )
+        for finger in hand.fingers
+    )
+    return replace(hand, fingers=fingers)

@@ -1,6 +1,8 @@
 """Plans and steps as JSON: SI, radians, joint names, poses as position and quaternion (x, y, z, w).
 
-plan.json holds {"hand", "joint_names", "rounds": [plan, ...], "grasp": grasp or null}; the fields
+plan.json holds {"hand", "joint_names", "coupled_joints", "rounds": [plan, ...], "grasp": grasp or
+null}; joint positions are those of `joint_names`, and a coupled joint {"joint", "follows",
+"multiplier", "offset"} stands at multiplier times the position of `follows` plus offset; the fields
 of a plan and of its probes are those of `plan_record` and `probe_record` below, those of a grasp
 of `grasp_record`; what the hand does in time is in each one's "motion"
 (`planner.trajectory_messages`).
@@ -29,6 +31,7 @@ def plan_document(hand: Hand, plans: list[Plan], grasp: Grasp | None = None) -> 
     return {
         "hand": hand.name,
         "joint_names": list(hand.joint_names),
+        "coupled_joints": [vars(coupling) for coupling in hand.couplings],
         "units": {"length": "m", "angle": "rad"},
         "rounds": [plan_record(plan) for plan in plans],
         "grasp": None if grasp is None else grasp_record(hand, grasp),
@@ -45,6 +48,7 @@ def plan_record(plan: Plan) -> dict[str, Any]:
         "reach": reach_record(reach),
         "retreat": {
             "joint_positions": plan.retreat.q.tolist(),
+            "joint_path": plan.retreat.path.tolist(),
             "base_poses": [pose_record(X) for X in plan.retreat.bases],
             "clearance": plan.retreat.clearance,
             "wanted": plan.retreat.wanted,
@@ -109,7 +113,7 @@ def reach_record(reach: Reach) -> dict[str, Any]:
         "position_residual": reach.position_residual,
         "pad_angle": reach.pad_angle,
         "joint_limit_margin": reach.limit_margin,
-        "self_clearance": reach.self_clearance,
+        "self_clearance": _finite(reach.self_clearance),
         "object_clearance": reach.object_clearance,
         "solver": reach.solver,
     }

@@ -15,7 +15,7 @@ from estimator.contact import SensorNoise
 from estimator.surface import Place, SurfaceOfRevolution
 from estimator.vectors import Index, frozen
 from hand_models.hand import Hand
-from planner.candidates import Candidates, placement_candidates, single_candidates
+from planner.candidates import Candidates
 from planner.choice import Ranking, rank
 from planner.funnel import Funnel
 from planner.goal import Goal
@@ -25,7 +25,7 @@ from planner.optimum import certificate, value_at
 from planner.options import PlannerOptions
 from planner.plan_types import NoPlan, Plan, Probe
 from planner.reach import Reach, Unreachable
-from planner.retreat import Retreat, ways_out
+from planner.retreat import Retreat
 from planner.risk import risks
 from planner.round_motion import RoundMotion, plan_round
 from planner.solid import RevolvedSolid, believed_solid
@@ -71,7 +71,9 @@ def plan_probes(
         NoPlan: Not even a single touch is left; its funnel says why.
     """
     options = options or PlannerOptions()
-    most = min(options.fingers_at_once, len(hand.fingers))
+    # A finger of one joint cannot go along a normal: the arm does, for one finger at a time.
+    nimble = sum(len(finger.joints) > 1 for finger in hand.fingers)
+    most = max(1, min(options.fingers_at_once, nimble))
     counts = range(most, 0, -1)
     return plan_preferred(hand, belief, sensor, counts, goal=goal, rng=rng, options=options)
 
@@ -116,7 +118,7 @@ def _best_placement(
     prefer: Preference | None,
 ) -> Plan | Funnel:
     """The best placement with `count` fingers that reach certifies, or what refused them all."""
-    candidates = _candidates(tools, belief.surface, options, count, rng)
+    candidates = tools.candidates(belief.surface, count, count=options.placements, rng=rng)
     funnel = tuple((f"{count} fingers: {reason}", n) for reason, n in candidates.rejected)
     if len(candidates) == 0:
         return funnel
@@ -130,7 +132,7 @@ def _best_placement(
         criterion=options.criterion, rng=rng,
     )  # fmt: skip
     ranking, scored = rank_all(candidates), 0
-    if options.sweep and count == 3 and options.criterion == "information":
+    if options.sweep and tools.arm is None and count == 3 and options.criterion == "information":
         more, scored = swept(
             tools.hand, tools.postures, tools.spheres, candidates, ranking.order[:FROM], worth,
             cone=options.reach.cone, is_self_free=tools.collision.is_self_free, rng=rng,
@@ -172,18 +174,6 @@ def _judged(
     return replace(plan, risks=found, choice=choice)
 
 
-def _candidates(
-    tools: HandTools,
-    surface: SurfaceOfRevolution,
-    options: PlannerOptions,
-    count: int,
-    rng: np.random.Generator,
-) -> Candidates:
-    make = single_candidates if count == 1 else partial(placement_candidates, fingers_at_once=count)
-    workspace, several = options.reach.workspace, options.placements
-    return make(tools.reach_map, surface, workspace=workspace, count=several, rng=rng)
-
-
 def _made(
     tools: HandTools,
     belief: Belief,
@@ -196,24 +186,27 @@ def _made(
     place = belief.surface.at(candidates.theta[i], candidates.z[i])
     names = tuple(tools.hand.fingers[k].name for k in candidates.fingers[i])
     start = Start(names, candidates.q[i], candidates.base(i))
-    several = len(names) > 1
-    reach = tools.solver.solve(
+    solver = tools.solver if len(names) > 1 else tools.single
+    by_base = len(names) == 1 and tools.arm is None
+    reach = solver.solve(
         place.p,
         place.n,
         solid,
         fingers=names,
         starts=[start],
-        motion="fingers" if several else "arm",
+        motion="arm" if by_base else "fingers",
     )
     if isinstance(reach, Unreachable):
         return reach.reason
-    ways = plan_approaches(tools.hand, reach) if several else (approach_by_base(tools.hand, reach),)
-    X_WB = reach.X_WB if several else ways[0].bases[0]
+    if by_base:
+        ways: tuple[Approach, ...] = (approach_by_base(tools.hand, reach),)
+        out = tools.ways_out(belief, replace(reach, X_WB=ways[0].bases[0]))
+    else:
+        ways, out = plan_approaches(solver.hand, reach), tools.ways_out(belief, reach)
     gentle = tuple(replace(way, force_goal=options.force_goal) for way in ways)
-    out = ways_out(tools.hand, tools.spheres, belief, reach.q_standoff, X_WB, np.asarray(place.n))
     if options.start is None:
         return _Made(reach, gentle, out[0], None)
-    movable = movable_among(tools.hand, tools.collision, solid, options.reach, options.limits)
+    movable = movable_among(tools.hand, tools.collision, solid, tools.rules, options.limits)
     motion = plan_round(movable, gentle, out, options.start)
     return motion if isinstance(motion, str) else _Made(reach, gentle, motion.retreat, motion)
 

@@ -32,7 +32,7 @@ LAID = 2400  # postures that are laid onto each
 GAP = 1e-3  # of a laid pad from the cylinder [m]
 INTRUSION = 4e-3  # of a link sphere into it [m]
 
-_VERSION = 1  # of all this; part of the cache's key
+_VERSION = 2  # of all this; part of the cache's key
 _HALF_TURN = np.diag([1.0, -1.0, -1.0])
 
 

@@ -5,7 +5,7 @@ joints at a stand-off before the contact and at an overshoot behind it, and both
 arm is to move, the way of the whole hand to the stand-off is kept clear instead. Written down
 once per set of fingers; contacts, object, base and cone are parameters.
 
-    minimise    |(q - middle) / range|^2 + 0.05 |s|^2 + shortfall of both distances + price slack
+    minimise    |(q - rest) / range|^2 + 0.05 |s|^2 + shortfall of both distances + price slack
     subject to  pad centre = p + radius n                      contact, exact
                 pad centre = p + (radius + standoff) n         stand-off
                 pad centre = p + (radius - overshoot) n        overshoot
@@ -41,8 +41,9 @@ from planner.solid import PARAMETERS, RevolvedSolid, signed_distance
 Array = NDArray[np.float64]
 
 _RETREATED = (0.5, 1.0)  # shares of an arm's retreat at which the hand is kept out of the object
+_CENTRAL = 0.25  # of the way from the start to mid-range: where the joints rest
 _TURN_WEIGHT = 0.05
-_KNOT_WEIGHT = 0.1  # stand-off and overshoot postures need not be central
+_KNOT_WEIGHT = 0.1  # stand-off and overshoot postures need not be near
 _SHORTFALL_WEIGHT = 5.0
 _SLACK_WEIGHT = 2000.0  # large enough that no slack is left where the task can be done
 
@@ -153,7 +154,7 @@ class ReachModel:
         return {
             "x": w.vector,
             "p": p.vector,
-            "f": _cost(hand, w, shape),
+            "f": _cost(hand, w, p, shape),
             "g": ca.vertcat(*rows) + w.slack,
         }
 
@@ -166,8 +167,8 @@ class ReachModel:
     @property
     def _moving(self) -> NDArray[np.intp]:
         """The spheres that the touching fingers move to the stand-off, pads included."""
-        names = [name for f in self.fingers for name in self.hand.fingers[f].joints]
-        joints = [int(self.hand.model.getJointId(name)) for name in names]
+        moving = self.shape.moving
+        joints = [j for j, x in enumerate(self.hand.model.joints) if j and x.idx_q in moving]
         return np.flatnonzero(np.isin(self.spheres.joints, joints))
 
     def _clearance(
@@ -205,7 +206,7 @@ class Parameters:
 
     def __init__(self, shape: Shape) -> None:
         k = shape.contacts
-        sizes = [3 * k, 3 * k, k, 9, 3, 9, 1, 1, 1, 1, 3, 4, PARAMETERS]
+        sizes = [3 * k, 3 * k, k, 9, 3, 9, 1, 1, 1, 1, 3, 4, PARAMETERS, shape.nq]
         self.vector = ca.MX.sym("p", sum(sizes))
         parts = ca.vertsplit(self.vector, np.cumsum([0, *sizes]).tolist())
         self.points, self.normals = (ca.reshape(part, 3, k) for part in parts[:2])
@@ -213,7 +214,7 @@ class Parameters:
         self.R_start, self.T_start = ca.reshape(parts[3], 3, 3), parts[4]
         self.R_nominal, self.least_cosine = ca.reshape(parts[5], 3, 3), parts[6]
         self.cone, self.wide_cone, self.clearance = parts[7:10]
-        self.retreat, self.table, self.solid = parts[10:]
+        self.retreat, self.table, self.solid, self.q_start = parts[10:]
 
 
 def pack_parameters(
@@ -227,6 +228,7 @@ def pack_parameters(
     retreat: Array,
     table: Array,
     solid: RevolvedSolid,
+    q_start: Array,
 ) -> Array:
     """The numbers of `Parameters`, in its order.
 
@@ -239,6 +241,7 @@ def pack_parameters(
         retreat: (3,) way of an arm from the contact to the stand-off [m].
         table: (4,) n, h of the half-space n . p >= h the hand must stay in.
         solid: The object.
+        q_start: (nq,) joint positions of the start.
     """
     parts = (
         points.ravel(),
@@ -251,19 +254,23 @@ def pack_parameters(
         retreat,
         table,
         solid.parameters,
+        q_start,
     )
     return np.concatenate([np.asarray(part, dtype=np.float64) for part in parts])
 
 
-def _cost(hand: Hand, w: Unknowns, shape: Shape) -> ca.MX:
+def _cost(hand: Hand, w: Unknowns, p: Parameters, shape: Shape) -> ca.MX:
+    """Near the start, which is free of self-collision (in mid-range some hands are not), but a
+    little off the limits."""
     span = hand.upper - hand.lower
+    rest = p.q_start + _CENTRAL * (hand.middle - p.q_start)
 
-    def central(q: ca.MX) -> ca.MX:
-        return ca.sumsqr((q - hand.middle) / span)
+    def near(q: ca.MX) -> ca.MX:
+        return ca.sumsqr((q - rest) / span)
 
-    cost = _SLACK_WEIGHT * w.slack + central(w.q) + _TURN_WEIGHT * ca.sumsqr(w.s)
+    cost = _SLACK_WEIGHT * w.slack + near(w.q) + _TURN_WEIGHT * ca.sumsqr(w.s)
     if shape.by_fingers:
-        cost += _KNOT_WEIGHT * (central(w.q_standoff) + central(w.q_overshoot))
+        cost += _KNOT_WEIGHT * (near(w.q_standoff) + near(w.q_overshoot))
         cost -= _SHORTFALL_WEIGHT * (ca.sum1(w.standoff) + ca.sum1(w.overshoot))
     return cost
 

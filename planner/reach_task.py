@@ -171,6 +171,7 @@ def _parameters(
         retreat=task.retreat,
         table=np.array(_NO_TABLE if options.table is None else options.table),
         solid=task.solid,
+        q_start=start.q,
     )
 
 

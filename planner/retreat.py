@@ -29,14 +29,16 @@ class Retreat:
     """How the hand leaves an object it touched.
 
     Args:
-        q: Joint positions throughout: the fingers at their stand-offs [rad].
-        bases: Poses of the hand base, from the stand-off on (`X_WB`).
+        q: Joint positions at the beginning: the fingers at their stand-offs [rad].
+        path: Joint positions on the way, (K, nq): q throughout, unless an arm moves the hand [rad].
+        bases: K poses of the hand base, from the stand-off on (`X_WB`).
         clearance: Least distance of hand and believed object at the end [m].
         wanted: How far off the object's wall may be, with 95 % probability [m].
         nearest: Least distance on the way [m].
     """
 
     q: Array
+    path: Array
     bases: tuple[pin.SE3, ...]
     clearance: float
     wanted: float
@@ -76,9 +78,8 @@ def ways_out(
         bases = tuple(
             pin.SE3(X_WB.rotation, X_WB.translation + s * direction) for s in way[: end + 1]
         )
-        ways.append(
-            Retreat(frozen(q), bases, float(gaps[end]), wanted, float(gaps[: end + 1].min()))
-        )
+        path, nearest = np.repeat(q[None], len(bases), axis=0), float(gaps[: end + 1].min())
+        ways.append(Retreat(frozen(q), frozen(path), bases, float(gaps[end]), wanted, nearest))
     return tuple(sorted(ways, key=lambda way: (-min(way.clearance, wanted), len(way.bases))))
 
 

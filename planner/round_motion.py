@@ -93,7 +93,9 @@ def plan_round(
 def _ways(movable: Movable, ways: Sequence[Retreat]) -> list[Retreat]:
     """Those that lead away; a base that is fixed stays, and joints alone lead to the next place."""
     if movable.workspace.is_fixed:
-        return [replace(ways[0], bases=ways[0].bases[:1], clearance=ways[0].nearest)]
+        first = ways[0]
+        still = replace(first, path=first.path[:1], bases=first.bases[:1], clearance=first.nearest)
+        return [still]
     return [way for way in ways if way.clearance >= min(way.wanted, OUTSIDE)]
 
 
@@ -168,14 +170,13 @@ def _outer(
     movable: Movable, way: Retreat, start: Configuration | None
 ) -> tuple[Transfer, Trajectory | None, list[MotionCertificate]] | str:
     """The way to the object and the way out, certified."""
-    q = np.repeat(way.q[None], len(way.bases), axis=0)
-    leave = timed(movable.hand, "leave", q, way.bases, movable.limits)
+    leave = timed(movable.hand, "leave", way.path, way.bases, movable.limits)
     found = [] if leave is None else [movable.certify(leave)]
     if found and found[0].faults:
         return f"on the way out, {found[0].faults[0]}"
     if start is None:
         return Transfer(None, None), leave, found
-    outside = Configuration(way.q, way.bases[-1])
+    outside = Configuration(way.path[-1], way.bases[-1])
     transfer = plan_transfer(movable, start, outside, wanted=way.wanted)
     if isinstance(transfer, str):
         return f"on the way to the object, {transfer}"

@@ -2,7 +2,7 @@
 
 First only the base looks for a way, six dimensions, while the joints keep to the straight line from
 where they are to where they are wanted, at a pace of their own; if that line is not free, or leads
-nowhere, the joints look as well. A base that is fixed leaves the joints alone.
+nowhere, the joints look as well. Where the base is fixed, or the root of an arm, only joints do.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 ROOM = 0.25  # of the base about begin and end [m]
 _RESOLUTION = 0.02  # between checked configurations [m], a turn of the base as on a 0.1 m arm
 _JOINT_WEIGHT = 0.05  # of a joint's angle beside the base's way [m/rad]
+_ARM_WEIGHT = 0.3  # the same for the joints of arm and hand [m/rad]
 _TURN_WEIGHT = 0.1  # of the base's turn [m/rad]
 _REDUCE = (30, 15, 1.0)  # attempts to leave corners out, in vain in a row, share of the path
 _SHORTEN = (30, 15, 1.0)  # likewise, between any two places
@@ -58,9 +59,8 @@ def sampled_path(
         margin: Least distance of the hand from the believed object [m].
         checks: How many configurations may be checked.
     """
-    every = _Joints(
-        movable.hand.lower, movable.hand.upper, (begin.q, end.q), _JOINT_WEIGHT, lambda q: q
-    )
+    weight = _JOINT_WEIGHT if movable.hand.arm is None else _ARM_WEIGHT
+    every = _Joints(movable.hand.lower, movable.hand.upper, (begin.q, end.q), weight, lambda q: q)
     along = end.q - begin.q
     line = _Joints(
         np.zeros(1), np.ones(1), (np.zeros(1), np.ones(1)),
@@ -68,7 +68,7 @@ def sampled_path(
     )  # fmt: skip
     on_line = (line.posture(np.array([u])) for u in np.linspace(0.0, 1.0, _ON_LINE))
     is_self_free = movable.around.collision.is_self_free
-    if not movable.workspace.is_fixed and all(is_self_free(q) for q in on_line):
+    if not movable.base_stays and all(is_self_free(q) for q in on_line):
         found = _search(movable, (begin, end), line, margin, checks // 2)
         if found is not None:
             return found
@@ -84,7 +84,7 @@ def _search(
 ) -> list[Configuration] | None:
     util.setLogLevel(util.LogLevel.LOG_NONE)
     util.RNG.setSeed(1 + movable.seed)
-    held = ends[0].X_WB if movable.workspace.is_fixed else None
+    held = ends[0].X_WB if movable.base_stays else None
     space, count = _space(ends, joints, held), 0
 
     def place(state: Any) -> Configuration:

@@ -6,7 +6,7 @@ criteria  error of the axis after each round of three touches, under each criter
           beliefs and seeds; candidates are random places, or what a hand reaches
 times     where the time of a plan goes
 
-Figures are medians with 95 % bootstrap intervals; the counts are objects or sessions.
+Figures are medians with half their 95 % bootstrap intervals; the counts are objects or sessions.
 
 Example: python scripts/benchmark.py choice --runs 20 --picture criteria.png
 """
@@ -194,7 +194,7 @@ def _columns(table: Table, *headings: str) -> None:
 
 def _median(values: np.ndarray) -> str:
     value, low, high = bootstrap(values, np.median)
-    return f"{value:.2f} [{low:.2f}-{high:.2f}]"
+    return f"{value:.2f} ±{0.5 * (high - low):.2f}"
 
 
 def picture(criteria: Sequence[Criterion], points: list[Point]) -> bytes:

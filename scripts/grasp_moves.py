@@ -36,7 +36,7 @@ def left_at(steps: Sequence[Step], start: Configuration | None) -> Configuration
     if not steps:
         return start
     way = steps[-1].plan.retreat
-    return Configuration(way.q, way.bases[-1])
+    return Configuration(way.path[-1], way.bases[-1])
 
 
 def act_motions(

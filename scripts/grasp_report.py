@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
+from worlds import raw_sensor_of
 
 from estimator.belief import Belief, update
 from estimator.contact import Contact, Miss
@@ -29,6 +30,9 @@ from sim_sensor.pictures import Signal
 from sim_sensor.world import TouchRecord, World
 
 Motions = Callable[[Step, Sequence[TouchRecord]], Sequence[ActMotion | None]]
+
+if TYPE_CHECKING:
+    from sim_sensor.mujoco_world import MujocoWorld
 
 
 def print_round(console: Console, step: Step, number: int) -> None:
@@ -104,7 +108,7 @@ def _shown(sensor: str, felt: Felt | None) -> Signal | None:
 
 def episode_of(
     surface: SurfaceOfRevolution,
-    world: World,
+    world: World | MujocoWorld,
     steps: list[Step],
     conclusion: str,
     sensor: str = "",
@@ -149,7 +153,7 @@ def belief_record(belief: Belief, steps: list[Step]) -> dict[str, Any]:
     }
 
 
-def raw_touches(sensor: str, steps: list[Step], world: World) -> RawTouches | None:
+def raw_touches(sensor: str, steps: list[Step], world: World | MujocoWorld) -> RawTouches | None:
     """The raw signals of all touches that met the object; None where the sensor has none."""
     probes = [probe for step in steps for probe in step.plan.probes]
     felt = [
@@ -162,7 +166,7 @@ def raw_touches(sensor: str, steps: list[Step], world: World) -> RawTouches | No
     signals = np.array([one.signal for _, one in felt])
     poses = np.array([one.X_WS for _, one in felt])
     fingers = tuple(finger for finger, _ in felt)
-    kind = raw_sensor(sensor).kind
+    kind = raw_sensor_of(world, sensor).kind
     if isinstance(kind, DepthPad):
         return RawTouches(
             poses, depth=signals, pixel_pitch=kind.pixel_pitch, pad_radius=kind.radius,

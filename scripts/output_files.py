@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import tempfile
 from pathlib import Path
+from typing import Any
 
 
 def require_writable(folder: Path) -> None:
@@ -20,6 +22,16 @@ def require_writable(folder: Path) -> None:
             pass
     except OSError as error:
         raise ValueError(f"--out {folder}: cannot be written ({error.strerror})") from None
+
+
+def write_json(path: Path, record: dict[str, Any]) -> None:
+    """Whole; JSON has no infinity and no NaN, and neither may the record.
+
+    Raises:
+        ValueError: It has.
+    """
+    text = json.dumps(record, indent=1, allow_nan=False)
+    write_whole(path, f"{text}\n".encode())
 
 
 def write_whole(path: Path, content: bytes) -> None:

@@ -19,28 +19,30 @@ Examples:
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
 import tyro
+from describe_hand import Options as DescribeOptions
+from describe_hand import describe
 from grasp_ending import Ending, ending, ending_record, grip_of, print_ending
 from grasp_moves import act_motions, from_home, left_at
 from grasp_report import belief_record, episode_of, print_round, raw_touches
 from obstacle_file import read_obstacles
-from output_files import require_writable, write_whole
+from output_files import require_writable, write_json
 from rich.console import Console
+from worlds import build_world, pose_in, print_object, sensor_in
 
-from estimator.axis import Axis, angle_between, offset_at
+from estimator.axis import angle_between, offset_at
 from estimator.belief import Belief
 from estimator.contact import Contact, Miss, SensorNoise
 from estimator.readers.raw_files import write_raw
-from estimator.readers.raw_sensors import RAW_SENSORS
 from estimator.sensors import sensor_noise
 from estimator.surface import SurfaceOfRevolution
 from hand_models import HandError, load_hand
@@ -53,12 +55,12 @@ from planner.options import PlannerOptions
 from planner.plan import NoPlan, Probe
 from planner.workspace import Workspace
 from sim_sensor.camera import coarse_view
-from sim_sensor.feeling import Sense
-from sim_sensor.noise import Session, simulated_sensor
 from sim_sensor.objects import load_object
-from sim_sensor.raw_sense import raw_sense
 from sim_sensor.view import write_page
 from sim_sensor.world import World
+
+if TYPE_CHECKING:
+    from sim_sensor.mujoco_world import MujocoWorld
 
 
 @dataclass(frozen=True)
@@ -66,13 +68,17 @@ class Options:
     """Command line of plan_grasp.py."""
 
     hand: str = "allegro_right"
-    """Hand: allegro_right, allegro_left, or the path of a description (.toml)."""
+    """Hand: one of hand_models/hands, or the path of a description (.toml)."""
+    describe_hand: Path | None = None
+    """Instead of all this, propose a description of the hand in this URDF or MJCF, into --out."""
     object: str = "can"
     """What is touched: a built-in name (can, bottle, cone, cup, barrel, jar-lid, knob, vase, egg,
-    spindle, paper-lathe, sphere) or a CSV file with columns r_mm,z_mm."""
+    spindle, paper-lathe, sphere), a CSV file (r_mm,z_mm), a product's JSON or a mesh (stl, obj)."""
     sensor: str = "gel"
     """Tactile sensor. Readings with noise: ideal, fearing1988, robotworld, taxel, gel, gel-good,
     gel-poor. Raw signals, simulated and read: fearing-strain, gel-depth, taxel-array."""
+    world: str = "own"
+    """own, or MuJoCo with gel-depth pads, the object held (mujoco) or on a table (mujoco-table)."""
     prior_angle_deg: float = 15.0
     """How far the camera's axis is off in direction."""
     prior_offset_mm: float = 15.0
@@ -108,7 +114,7 @@ class Scenario:
     surface: SurfaceOfRevolution
     belief: Belief
     told: SensorNoise
-    world: World
+    world: World | MujocoWorld
     hand: Hand
     goal: Goal
     planner: PlannerOptions
@@ -117,13 +123,17 @@ class Scenario:
 
 def main() -> int:
     options = tyro.cli(Options, description=__doc__)
+    if options.describe_hand is not None:
+        return describe(DescribeOptions(options.describe_hand, out=options.out))
     console = Console()
     try:
+        options = replace(options, sensor=sensor_in(options.world, options.sensor))
         scenario = _scenario(options)
         require_writable(options.out)
     except (ValueError, HandError) as error:
         print(f"plan_grasp: {error}", file=sys.stderr)
         return 2
+    print_object(console, options.object)
     steps: list[Step] = []
     reason = ""
     try:
@@ -148,8 +158,7 @@ def _scenario(options: Options) -> Scenario:
     if options.seed < 0:
         raise ValueError(f"--seed: expected a number >= 0, got {options.seed}")
     rng = np.random.default_rng(options.seed)
-    upright = Axis([0.5, 0.0, 0.2], [0.2 * rng.normal(), 0.2 * rng.normal(), 1.0])
-    surface = SurfaceOfRevolution(upright, load_object(options.object))
+    surface = SurfaceOfRevolution(pose_in(options.world, rng), load_object(options.object))
     hand = load_hand(options.hand)
     return Scenario(
         surface=surface,
@@ -160,19 +169,12 @@ def _scenario(options: Options) -> Scenario:
             rng=rng,
         ),
         told=sensor_noise(options.sensor),
-        world=World(surface, _mounted(options.sensor, surface, rng), rng=rng),
+        world=build_world(options.world, hand, surface, options.sensor, rng),
         hand=hand,
         goal=Goal(np.deg2rad(options.goal_angle_deg), 1e-3 * options.goal_offset_mm),
         planner=from_home(hand, _planner_options(options)),
         grasp=_grasp_options(options),
     )
-
-
-def _mounted(name: str, surface: SurfaceOfRevolution, rng: np.random.Generator) -> Session | Sense:
-    """The sensor that feels the world, raw or at reading level."""
-    if name in RAW_SENSORS:
-        return raw_sense(name, surface, rng=rng)
-    return simulated_sensor(name).session(rng=rng)
 
 
 def _planner_options(options: Options) -> PlannerOptions:
@@ -234,8 +236,9 @@ def _conclude(
     belief = steps[-1].after if steps else scenario.belief
     unconfirmed = steps[-1].surprise if steps else None
     met = scenario.goal.met_by(belief) and unconfirmed is None
-    truth = scenario.surface.axis
-    middle = truth.point + np.mean(scenario.surface.profile.z_range) * truth.direction
+    surface = scenario.world.surface
+    truth = surface.axis
+    middle = truth.point + np.mean(surface.profile.z_range) * truth.direction
     error = {
         "angle_deg": float(np.rad2deg(angle_between(belief.axis, truth))),
         "offset_mm": 1e3 * offset_at(belief.axis, truth, middle),
@@ -250,7 +253,7 @@ def _conclude(
     if met:
         with console.status("planning the grasp ..."):
             grasp = replace(scenario.grasp, start=left_at(steps, scenario.planner.start))
-            end = ending(scenario.hand, belief, scenario.surface, grasp, rng=rng)
+            end = ending(scenario.hand, belief, surface, grasp, rng=rng)
         print_ending(console, end)
     result = {
         "goal_met": met,
@@ -259,26 +262,25 @@ def _conclude(
         "truth": {
             "axis": {"point": truth.point.tolist(), "direction": truth.direction.tolist()},
             "object": options.object,
+            "world": options.world,
         },
         "error": error,
         "goal": {"angle_deg": options.goal_angle_deg, "offset_mm": options.goal_offset_mm},
         "grasp": ending_record(end),
     }
-    document = plan_document(scenario.hand, [step.plan for step in steps], end.grasp)
-    plans = json.dumps(document, indent=1, allow_nan=False)
-    told = json.dumps(result, indent=1, allow_nan=False)
+    plans = plan_document(scenario.hand, [step.plan for step in steps], end.grasp)
     try:
         options.out.mkdir(parents=True, exist_ok=True)
         if steps:
             words = f"{error['angle_deg']:.2f} deg and {error['offset_mm']:.2f} mm from the truth"
             episode = episode_of(
-                scenario.surface, scenario.world, steps, words, options.sensor,
+                surface, scenario.world, steps, words, options.sensor,
                 grip_of(scenario.hand, end),
                 partial(act_motions, scenario.hand, scenario.planner.limits),
             )  # fmt: skip
             write_page(options.out / "probes.html", scenario.hand, episode)
-        write_whole(options.out / "plan.json", f"{plans}\n".encode())
-        write_whole(options.out / "result.json", f"{told}\n".encode())
+        write_json(options.out / "plan.json", plans)
+        write_json(options.out / "result.json", result)
         raw = raw_touches(options.sensor, steps, scenario.world)
         if raw is not None:
             write_raw(options.out / "raw.npz", raw)

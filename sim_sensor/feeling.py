@@ -19,7 +19,7 @@ class Touched:
 
     Args:
         truth: Exact geometry there.
-        place: Of the wall, none on a cap or a rim.
+        place: Of the wall, none on a cap, a rim or a scanned surface: its shape is `truth`.
         finger_axis_W: Direction of the finger's last link, unit, (3,); None is horizontal.
         site: Offsets shared with earlier readings at this place.
     """

@@ -7,10 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
 
 from estimator.surface import SurfaceOfRevolution
 from estimator.vectors import Array, basis_across, frozen
+from hand_models.geometry import vertices
 from sim_sensor.episode import CHI2_95_OF_2, BelievedAxis
+from sim_sensor.scanned import wall_points
 
 LARGEST_TUBE = 0.09  # wider would hide everything else [m]
 
@@ -32,7 +35,7 @@ def lathe_mesh(surface: SurfaceOfRevolution, *, rings: int = 64, segments: int =
     """The true object with its two caps, in the world."""
     z = np.linspace(*surface.profile.z_range, rings)
     theta = np.linspace(0.0, 2.0 * np.pi, segments, endpoint=False)
-    wall = surface.at(theta, z[:, None]).p.reshape(-1, 3)
+    wall = wall_points(surface, theta, z[:, None]).reshape(-1, 3)
     ends = surface.axis.point + np.outer(z[[0, -1]], surface.axis.direction)
     around = np.arange(segments)
     nxt = np.roll(around, -1)
@@ -69,14 +72,24 @@ def tube_mesh(
     return Mesh(frozen(vertices.reshape(-1, 3)), _ring_faces(rings, segments))
 
 
-def link_mesh(geometry: pin.GeometryObject) -> Mesh | None:
-    """Triangles of a link's visual mesh in its own frame; None for a shape without triangles."""
+def link_mesh(geometry: pin.GeometryObject) -> Mesh:
+    """Triangles of a link's shape in its own frame; of a primitive's convex hull."""
     shape = geometry.geometry
     if not hasattr(shape, "tri_indices"):
-        return None
+        return _hull_mesh(vertices(shape))
     triangles = (shape.tri_indices(i) for i in range(shape.num_tris))
     faces = np.array([[t[0], t[1], t[2]] for t in triangles], dtype=np.int64)
     return Mesh(frozen(shape.vertices()), faces.reshape(-1, 3))
+
+
+def _hull_mesh(points: Array) -> Mesh:
+    """The hull's triangles, all turned outwards."""
+    hull = ConvexHull(points)
+    corners = points[hull.simplices]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inward = np.einsum("fi,fi->f", normals, hull.equations[:, :3]) < 0.0
+    faces = np.where(inward[:, None], hull.simplices[:, ::-1], hull.simplices)
+    return Mesh(frozen(points), faces.astype(np.int64))
 
 
 def _ring_faces(rings: int, segments: int) -> NDArray[np.int64]:

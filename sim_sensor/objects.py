@@ -1,4 +1,4 @@
-"""Things to touch: built-in profiles by name, and profiles from a CSV of r,z rows.
+"""Things to touch: built-in profiles by name, profiles from a CSV of r,z rows, real products.
 
 Every profile is twice differentiable and centred: z = 0 is at half height. Sizes are those of
 things a hand takes hold of.
@@ -23,6 +23,8 @@ from estimator.profile import (
     spline_through,
 )
 from estimator.vectors import Array
+from sim_sensor.mesh_objects import SUFFIXES, read_mesh
+from sim_sensor.product_files import read_product
 
 INCH = 0.0254
 _UNITS = {"mm": 1e-3, "m": 1.0}
@@ -69,14 +71,17 @@ OBJECTS: tuple[str, ...] = tuple(_OBJECTS)
 
 
 def load_object(name_or_csv: str | Path) -> Profile:
-    """A built-in object by name, or the spline through the points of a CSV file.
+    """A built-in object by name, the spline through the points of a CSV file, or a real product.
 
-    The file has the header `r_mm,z_mm` or `r_m,z_m` (columns in either order) and one row for
+    The CSV file has the header `r_mm,z_mm` or `r_m,z_m` (columns in either order) and one row for
     each point, z rising or falling from row to row. The profile is moved along the axis so that
-    z = 0 is at half height.
+    z = 0 is at half height. A JSON file is a product (`sim_sensor.product_files`), a mesh
+    somebody's scan (`sim_sensor.mesh_objects`).
 
     Args:
         name_or_csv: One of `OBJECTS`, or the path of a file.
+    Returns:
+        A `Scan` where there is a residual map.
     Raises:
         ValueError: Unknown name (lists the known ones), or a file whose header, numbers or order
             of points do not make a profile; the message says which line.
@@ -86,16 +91,30 @@ def load_object(name_or_csv: str | Path) -> Profile:
         return _OBJECTS[name]()
     path = Path(name_or_csv)
     if path.is_file():
-        profile = _read_profile(path)
-        if max(profile.r.max(), np.ptp(profile.z)) > LARGEST:
+        profile = _read(path)
+        if _size(profile) > LARGEST:
             raise ValueError(f"object {path}: larger than {LARGEST:g} m, is the unit right?")
         return profile
-    if path.suffix.lower() == ".csv":
+    if path.suffix.lower() in (".csv", ".json", *SUFFIXES):
         raise ValueError(f"object {name!r}: there is no such file")
     raise ValueError(
         f"object {name!r} is unknown; known are {', '.join(OBJECTS)}, "
-        "or the path of a CSV file with the header r_mm,z_mm"
+        "or the path of a CSV file with the header r_mm,z_mm, a product's JSON file or a mesh"
     )
+
+
+def _read(path: Path) -> Profile:
+    """By its ending; what has none that is known is a CSV."""
+    suffix = path.suffix.lower()
+    if suffix in SUFFIXES:
+        return read_mesh(path).scan
+    return read_product(path) if suffix == ".json" else _read_profile(path)
+
+
+def _size(profile: Profile) -> float:
+    """The larger of radius and height [m]."""
+    z = np.linspace(*profile.z_range, 201)
+    return float(max(profile.derivatives(z)[0].max(), z[-1] - z[0]))
 
 
 def _read_profile(path: Path) -> SplineProfile:

@@ -55,7 +55,7 @@ class TactelSense:
         pressed = self.session.press(place, [force], _tensor(touched.truth, axes)[None], rng=rng)
         R_WS, p_S = _laid(axes, place, float(pressed.indentation[0]), array)
         X_WS = _pose(R_WS, touched.truth.p - R_WS @ p_S) @ np.linalg.inv(self.X_SM)
-        return _read(self.sensor, pressed.readings[0], X_WS, rng)
+        return read_signal(self.sensor, pressed.readings[0], X_WS, rng)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +79,7 @@ class GelSense:
         at = np.clip(OFF_CENTRE * rng.standard_normal(2), -2.0 * OFF_CENTRE, 2.0 * OFF_CENTRE)
         body = _body(self.surface, touched)
         image = self.session.press(body, rng=rng, force=_force(self.force, rng), at=at)
-        return _read(self.sensor, image.depth[0], image.X_WS[0], rng)
+        return read_signal(self.sensor, image.depth[0], image.X_WS[0], rng)
 
 
 def raw_sense(
@@ -104,9 +104,11 @@ def _force(median: float, rng: np.random.Generator) -> float:
     return float(median * np.exp(FORCE_SPREAD * rng.standard_normal()))
 
 
-def _read(sensor: RawSensor, signal: Array, X_WS: Array, rng: np.random.Generator) -> Felt:
-    """The reader's answer, at the pose that the arm believes."""
-    X_WS = frozen(_jolted(X_WS, rng))
+def read_signal(
+    sensor: RawSensor, signal: Array, X_WS: Array, rng: np.random.Generator | None
+) -> Felt:
+    """The reader's answer, at the pose that the arm believes; an arm without errors has no rng."""
+    X_WS = frozen(X_WS if rng is None else _jolted(X_WS, rng))
     surface = sensor.read(signal)
     if surface is None:
         return Felt(None, signal, X_WS)

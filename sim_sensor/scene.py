@@ -104,8 +104,8 @@ def build_scene(hand: Hand, episode: Episode) -> Scene:
     beats = schedule(episode.acts)
     duration = end_of(episode, beats) + 2.0
     frames = postures(hand.model, episode, beats)
-    stage = [*_room(), *_links(hand), *_truth(episode)]
-    tracks = [*_hand_tracks(hand, frames)]
+    stage = [*room(), *links(hand), *_truth(episode)]
+    tracks = [*hand_tracks(hand, frames)]
     for i, (act, beat) in enumerate(zip(episode.acts, beats, strict=True)):
         end = None if i == len(beats) - 1 else beat.end
         stage += _belief(f"/belief/{i}/before", act.before, BEFORE, episode)
@@ -120,7 +120,7 @@ def build_scene(hand: Hand, episode: Episode) -> Scene:
     return Scene(tuple(stage), tuple(tracks), beats, duration, camera)
 
 
-def _hand_tracks(hand: Hand, frames: tuple[Posture, ...]) -> Iterator[Track]:
+def hand_tracks(hand: Hand, frames: tuple[Posture, ...]) -> Iterator[Track]:
     """The base in the world, and every link that a joint moves in the base."""
     data, visual = hand.model.createData(), pin.GeometryData(hand.visual_model)
     placements: dict[str, list[pin.SE3]] = {}
@@ -160,14 +160,12 @@ def _shown(path: str, start: float, end: float | None = None) -> Track:
     return Track(path, "visible", "bool", (*hidden_first, (start, True), *hidden_last))
 
 
-def _links(hand: Hand) -> Iterator[Command]:
+def links(hand: Hand) -> Iterator[Command]:
     """The hand's visual meshes, in its base."""
     for shape in hand.visual_model.geometryObjects:
-        mesh = link_mesh(shape)
-        if mesh is not None:
-            grey = float(np.mean(shape.meshColor[:3]))
-            color = 0xD9B99B if grey > 0.5 else 0x4A4F57
-            yield set_mesh(_link_path(shape), mesh, color, flatShading=True)
+        grey = float(np.mean(shape.meshColor[:3]))
+        color = 0xD9B99B if grey > 0.5 else 0x4A4F57
+        yield set_mesh(_link_path(shape), link_mesh(shape), color, flatShading=True)
 
 
 def _link_path(shape: pin.GeometryObject) -> str:
@@ -208,7 +206,7 @@ def _outcome(path: str, act: Act) -> Iterator[Command]:
         yield from set_stick(f"{path}/direction{i}", begin, end, DIRECTION, 0.0012, **_XRAY)
 
 
-def _room() -> Iterator[Command]:
+def room() -> Iterator[Command]:
     """A light background and no grid."""
     for node in ("/Grid", "/Axes"):
         yield set_property(node, "visible", False)

@@ -36,12 +36,14 @@ class NearestPlace:
         rho: Distance of the place from the axis [m].
         z: Height of the place [m].
         part: Wall, flat cap, or the rim between them.
+        theta: Meridian angle of the place [rad].
     """
 
     distance: float
     rho: float
     z: float
     part: Part
+    theta: float = 0.0
 
 
 class Solid:
@@ -61,14 +63,14 @@ class Solid:
         """Of the profile's samples [m]."""
         return float(self._r.max())
 
-    def nearest(self, rho: float, z: float) -> NearestPlace:
-        """The place of the surface nearest to (rho, z), rho >= 0 [m]."""
+    def nearest(self, rho: float, z: float, theta: float = 0.0) -> NearestPlace:
+        """The place of the surface nearest to (rho, z), rho >= 0 [m], on the same meridian."""
         low, high = self._profile.z_range
         inside = low < z < high and rho < float(self._profile.derivatives(np.array(z))[0])
         places = [self._on_wall(rho, z), self._on_cap(0, rho, z), self._on_cap(-1, rho, z)]
         best = min(places, key=lambda place: place.distance)
         distance = -best.distance if inside else best.distance
-        return NearestPlace(distance, best.rho, best.z, best.part)
+        return NearestPlace(distance, best.rho, best.z, best.part, theta)
 
     def _on_cap(self, end: int, rho: float, z: float) -> NearestPlace:
         edge, height = float(self._r[end]), float(self._z[end])

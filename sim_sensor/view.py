@@ -12,6 +12,7 @@ import importlib.resources
 import json
 import os
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -59,7 +60,7 @@ def write_page(path: str | Path, hand: Hand, episode: Episode) -> Path:
                 f"its path has {act.path.shape[1]}"
             )
     scene = build_scene(hand, episode)
-    _replace(path, _render(scene, episode))
+    write_text(path, _render(scene, episode))
     return path
 
 
@@ -79,19 +80,44 @@ def _signals(scene: Scene, episode: Episode) -> list[dict[str, object]]:
 
 def _render(scene: Scene, episode: Episode) -> str:
     """The page's text."""
+    return page_text(
+        scene,
+        title=episode.title,
+        legend=_LEGEND,
+        captions=captions(episode, scene.beats),
+        signals=_signals(scene, episode),
+    )
+
+
+def page_text(
+    scene: Scene,
+    *,
+    title: str,
+    legend: Sequence[tuple[str, int]],
+    captions: list[dict[str, Any]],
+    signals: list[dict[str, Any]],
+) -> str:
+    """A scene as one page.
+
+    Args:
+        title: Above the legend.
+        legend: Words and their colours, 0xRRGGBB.
+        captions: What is said from which time on: "time" [s], "head", "body".
+        signals: Raw pictures: "time" [s], "finger", "words", "image".
+    """
     packed = [*scene.commands, scene.animation()]
-    legend = "".join(
+    listed = "".join(
         f'<li><i style="background:#{color:06x}"></i>{html.escape(name)}</li>'
-        for name, color in _LEGEND
+        for name, color in legend
     )
     parts = {
-        "TITLE": html.escape(episode.title),
-        "LEGEND": legend,
+        "TITLE": html.escape(title),
+        "LEGEND": listed,
         "VIEWER": _viewer(),
         "COMMANDS": _script([_packed(command) for command in packed]),
-        "CAPTIONS": _script(captions(episode, scene.beats)),
+        "CAPTIONS": _script(captions),
         "MARKS": _script([beat.touch for beat in scene.beats]),
-        "SIGNALS": _script(_signals(scene, episode)),
+        "SIGNALS": _script(signals),
         "EYE": _script(scene.camera.eye.tolist()),
         "TARGET": _script(scene.camera.target.tolist()),
         "DURATION": _script(scene.duration),
@@ -121,7 +147,7 @@ def _script(value: object) -> str:
     return json.dumps(value).replace("</", "<\\/").replace("<!--", "<\\!--")
 
 
-def _replace(path: Path, text: str) -> None:
+def write_text(path: Path, text: str) -> None:
     """Write beside the target, then rename: never half a page."""
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
     try:

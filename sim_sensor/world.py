@@ -11,6 +11,7 @@ Conventions
     A path that starts inside the object had too short a stand-off: the finger would have touched
     on its way there. It is taken back along its first step until it is free and touches from
     there; `TouchRecord.overlap` says by how much, and `stop` is 0.
+    A scanned wall has its dents; a pad feels the best quadric over its patch (`scanned.felt`).
 """
 
 from __future__ import annotations
@@ -24,8 +25,10 @@ import numpy as np
 from estimator.contact import Contact, Miss
 from estimator.surface import Geometry, Place, SurfaceOfRevolution
 from estimator.vectors import Array, basis_across, frozen, unit
+from sim_sensor.dented_solid import DentedSolid
 from sim_sensor.feeling import Felt, ReadingSense, Sense, Touched
 from sim_sensor.noise import Session, Site
+from sim_sensor.scanned import Scan, felt_at
 from sim_sensor.solid import NearestPlace, Part, Solid
 
 EDGE_RADIUS = 0.5e-3  # fillet of a rim [m]
@@ -82,7 +85,8 @@ class World:
         self.surface = surface
         self._sense: Sense = ReadingSense(sensor) if isinstance(sensor, Session) else sensor
         self._rng = rng
-        self._solid = Solid(surface.profile)
+        profile = surface.profile
+        self._solid = DentedSolid(profile) if isinstance(profile, Scan) else Solid(profile)
         self._records: list[TouchRecord] = []
 
     @property
@@ -131,14 +135,17 @@ class World:
 
     def _touched(self, tip: Array, site: Site | None, finger_axis_W: Array | None) -> Touched:
         """Where a pad rests whose centre stopped at `tip`."""
-        nearest, theta = self._nearest(tip), float(self.surface.place_of(tip).theta)
-        place = Place(theta, nearest.z) if nearest.part is Part.WALL else None
-        return Touched(self._geometry(tip, nearest, theta), place, finger_axis_W, site)
+        nearest = self._nearest(tip)
+        bare = nearest.part is Part.WALL and not isinstance(self.surface.profile, Scan)
+        place = Place(nearest.theta, nearest.z) if bare else None
+        return Touched(self._geometry(tip, nearest), place, finger_axis_W, site)
 
-    def _geometry(self, tip: Array, place: NearestPlace, theta: float) -> Geometry:
+    def _geometry(self, tip: Array, place: NearestPlace) -> Geometry:
         """Exact geometry at the place nearest to the pad's centre."""
-        x, y, u = self.surface.frame
+        (x, y, u), theta, profile = self.surface.frame, place.theta, self.surface.profile
         if place.part is Part.WALL:
+            if isinstance(profile, Scan):
+                return felt_at(self.surface, profile, theta, place.z)
             return self.surface.at(np.array(theta), np.array(place.z))
         out = np.cos(theta) * x + np.sin(theta) * y
         p = self.surface.axis.point + place.rho * out + place.z * u
@@ -152,7 +159,7 @@ class World:
 
     def _nearest(self, point_W: Array) -> NearestPlace:
         x, y, z = self.surface.frame @ (point_W - self.surface.axis.point)
-        return self._solid.nearest(float(np.hypot(x, y)), float(z))
+        return self._solid.nearest(float(np.hypot(x, y)), float(z), float(np.arctan2(y, x)))
 
     def _free_start(self, centres: Array, radius: float) -> Array:
         """A point behind the path's start where the pad is clear of the object."""

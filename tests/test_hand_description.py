@@ -139,10 +139,10 @@ WRONG_FIELDS = [
     (
         'source = "planar.urdf"',
         'source = "planar.urdf"\npackage_directories = "meshes"',
-        "package_directories must be a list of paths, got 'meshes'",
+        "package_directories must be a list of strings, got 'meshes'",
     ),
     ('source = "planar.urdf"', 'source = "planar.urdf"\nurl = ""', "unknown key 'url'; allowed"),
-    ('"nail"', '"tip"', "no link 'tip' for tip_frame; its links are base, .*distal, nail"),
+    ('"nail"', '"tip"', "no link 'tip' for tip_frame; links are base, .*distal, nail"),
     ('"nail"', '"base"', "no joint moves tip_frame 'base'"),
     ("[0.0, 0.005, 0.0]", "[0.0, 0.005]", "pad_centre must be three finite numbers, got"),
     ("[0.0, 0.005, 0.0]", "[0.0, nan, 0.0]", "pad_centre must be three finite numbers, got"),
@@ -162,6 +162,41 @@ WRONG_FIELDS = [
         "two fingers are named 'only'",
     ),
     ("[[fingers]]", "[[fingers", "not a TOML file"),
+    (
+        'source = "planar.urdf"',
+        'source = "planar.urdf"\nbase = "palm"',
+        "no link 'palm' for base; links are base, proximal",
+    ),
+    (
+        'source = "planar.urdf"',
+        'source = "planar.urdf"\nfixed = {wrist = 0.0}',
+        "no joint 'wrist' to be fixed; joints are knuckle, elbow",
+    ),
+    (
+        'source = "planar.urdf"',
+        'source = "planar.urdf"\nfixed = {elbow = "bent"}',
+        "fixed must be a table of finite numbers, got",
+    ),
+    (
+        "[[fingers]]",
+        "[[copies]]\nposition = [0, 0, 0]\n[[fingers]]",
+        r"copies\[0\]: key 'prefix' is missing",
+    ),
+    (
+        "[[fingers]]",
+        '[[copies]]\nprefix = "a"\n[[copies]]\nprefix = "a"\n[[fingers]]',
+        "two links are named 'abase'; a prefix tells copies apart",
+    ),
+]
+
+WRONG_SIZES = [
+    ("0.008", "8", "pad_radius is 8 m, as if millimetres were taken for metres"),
+    ("[0.0, 0.005, 0.0]", "[0.0, 5.0, 0.0]", "finger 'only' is 4.95 m long .*as if millimetres"),
+    (
+        "[0.0, 0.005, 0.0]",
+        f"[{-LOWER}, 0.0, 0.0]",
+        "joint elbow does not move the pad .*: a link of no length, or a wrong tip_frame",
+    ),
 ]
 
 
@@ -176,14 +211,50 @@ def test_a_wrong_field_is_named_in_one_line(
     assert "\n" not in str(refused.value)
 
 
+@pytest.mark.parametrize(("right", "wrong", "message"), WRONG_SIZES)
+def test_a_size_that_no_hand_has_is_told_with_what_to_look_at(
+    tmp_path: Path, right: str, wrong: str, message: str
+) -> None:
+    assert right in DESCRIPTION
+    file = _write(tmp_path, DESCRIPTION.replace(right, wrong, 1))
+    with pytest.raises(HandError, match=message) as refused:
+        load_hand(file)
+    assert "\n" not in str(refused.value)
+
+
 WRONG_URDFS = [
-    ('name="elbow" type="revolute"', 'name="elbow" type="continuous"', "joint 'elbow' is a .*RUBZ"),
+    (
+        'name="elbow" type="revolute"',
+        'name="elbow" type="continuous"',
+        "joint 'elbow' turns without limits",
+    ),
     ('name="elbow" type="revolute"', 'name="elbow" type="floating"', "joint 'elbow' .*FreeFlyer"),
     ('lower="0" upper="2"', 'lower="2" upper="2"', "joint 'elbow' has limits 2 to 2; .*below"),
-    ('<limit lower="0"', '<mimic joint="knuckle"/><limit lower="0"', "'elbow' has a <mimic> tag"),
+    ('<limit lower="0" upper="2" effort="1" velocity="1"/>', "", "joint 'elbow' has no <limit>"),
+    ('<limit lower="0"', '<mimic joint="wrist"/><limit lower="0"', "mimic. of 'wrist', and there"),
+    (
+        '<child link="nail"/>',
+        '<child link="base"/>',
+        "links hang on each other in a cycle: .*base",
+    ),
+    (
+        '<parent link="distal"/><child link="nail"/>',
+        '<parent link="base"/><child link="distal"/>',
+        "link 'distal' hangs on both 'proximal' and 'base'; .* without cycles",
+    ),
     ("</robot>", "", "cannot read '.*planar.urdf'"),
-    ('<child link="nail"/>', '<child link="thumb"/>', "cannot read '.*planar.urdf'"),
+    ('<child link="nail"/>', '<child link="thumb"/>', "'fixed' has the child link 'thumb', which"),
     ("wedge.stl", "missing.stl", "cannot read '.*planar.urdf': .*missing.stl"),
+    (
+        'filename="meshes/wedge.stl"',
+        'filename="meshes/wedge.stl" scale="1000 1000 1000"',
+        "mesh of 'proximal_0' is 10 m long, as if millimetres were taken for metres: <mesh scale",
+    ),
+    (
+        f'xyz="{UPPER} 0 0"',
+        f'xyz="{1000 * UPPER} 0 0"',
+        "finger 'only' is 60 m long from its first joint to its pad, as if millimetres",
+    ),
 ]
 
 
@@ -199,8 +270,8 @@ def test_a_urdf_that_is_no_hand_is_refused_in_one_line(
 
 
 def test_an_unknown_hand_is_answered_with_the_known_ones() -> None:
-    with pytest.raises(HandError, match="unknown hand 'shadow': known are allegro_left, allegro_"):
-        load_hand("shadow")
+    with pytest.raises(HandError, match="unknown hand 'gripper': known are allegro_left, allegro_"):
+        load_hand("gripper")
 
 
 def test_a_missing_description_is_named(tmp_path: Path) -> None:

@@ -1,0 +1,84 @@
+"""The worlds that plan_grasp.py can touch: our own, and MuJoCo's with the object held or standing.
+
+    own            the true surface in closed form; any sensor
+    mujoco         a physics engine moves the hand, the object is held; pads are domes of gel
+    mujoco-table   the same, but the object stands upright on a table and can be pushed
+
+MuJoCo is installed with the extra `mujoco`; nothing here imports it unless it is asked for.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from rich.console import Console
+
+from estimator.axis import Axis
+from estimator.readers.raw_sensors import RAW_SENSORS, RawSensor, raw_sensor
+from estimator.surface import SurfaceOfRevolution
+from hand_models.hand import Hand
+from sim_sensor.mesh_objects import SUFFIXES, read_mesh
+from sim_sensor.noise import simulated_sensor
+from sim_sensor.raw_sense import raw_sense
+from sim_sensor.world import World
+
+if TYPE_CHECKING:
+    from sim_sensor.mujoco_world import MujocoWorld
+
+WORLDS = ("own", "mujoco", "mujoco-table")
+_DEFAULT, _OF_MUJOCO = "gel", "gel-depth"
+
+
+def sensor_in(world: str, sensor: str) -> str:
+    """The sensor that a world mounts when this one is asked for.
+
+    Raises:
+        ValueError: Unknown world, or a sensor that it does not have.
+    """
+    if world not in WORLDS:
+        raise ValueError(f"--world {world!r} is unknown; known are {', '.join(WORLDS)}")
+    if world == "own":
+        return sensor
+    if sensor not in (_DEFAULT, _OF_MUJOCO):
+        raise ValueError(f"--world {world}: its pads are {_OF_MUJOCO}, not --sensor {sensor}")
+    return _OF_MUJOCO
+
+
+def pose_in(world: str, rng: np.random.Generator) -> Axis:
+    """A nearly upright object; upright where it stands by itself."""
+    tilt = 0.2 * rng.normal(size=2)
+    return Axis([0.5, 0.0, 0.2], [*(tilt if world != "mujoco-table" else 0.0 * tilt), 1.0])
+
+
+def build_world(
+    world: str, hand: Hand, surface: SurfaceOfRevolution, sensor: str, rng: np.random.Generator
+) -> World | MujocoWorld:
+    """The world around an object.
+
+    Raises:
+        ValueError: MuJoCo is not installed.
+    """
+    if world == "own":
+        if sensor in RAW_SENSORS:
+            return World(surface, raw_sense(sensor, surface, rng=rng), rng=rng)
+        return World(surface, simulated_sensor(sensor).session(rng=rng), rng=rng)
+    try:
+        from sim_sensor.mujoco_models import Standing
+        from sim_sensor.mujoco_world import MujocoWorld
+    except ImportError as error:
+        raise ValueError(f"--world {world}: needs the extra 'mujoco' ({error})") from None
+    standing = Standing() if world == "mujoco-table" else None
+    return MujocoWorld(hand, surface, rng=rng, standing=standing)
+
+
+def print_object(console: Console, name: str) -> None:
+    """How far a user's mesh is from what everything here believes in."""
+    if Path(name).suffix.lower() in SUFFIXES:
+        console.print(f"[bold]Object[/] {read_mesh(Path(name)).words}")
+
+
+def raw_sensor_of(world: World | MujocoWorld, sensor: str) -> RawSensor:
+    """The raw sensor as it is mounted: pads of a hand in MuJoCo have the hand's own radius."""
+    return raw_sensor(sensor) if isinstance(world, World) else world.sensor
