@@ -124,7 +124,7 @@ def test_a_clipped_image_is_flagged_and_read_from_what_is_left():
 def test_an_image_clipped_all_over_is_flagged_and_says_little():
     local = read_depth(np.full((48, 48), 2.5e-3), PITCH).surface()
     assert "depth saturated" in local.flags
-    assert np.all(np.isfinite(local.point))
+    assert np.all(np.isfinite(local.position))
     assert sd_of_tensor(local).min() > 10.0
 
 
