@@ -25,6 +25,7 @@ class Arm:
         flange_id: Index of F into `model.frames`.
         X_FB: Pose of the hand base in the flange.
         X_WA: Pose of the arm's root in the world.
+        home: (n,) where its joints begin [rad], [m].
         q_indices: Where the arm's joints are in the configuration of the whole.
         hand_q_indices: Where the hand's are.
     """
@@ -34,6 +35,7 @@ class Arm:
     flange_id: int
     X_FB: pin.SE3
     X_WA: pin.SE3
+    home: Array
     q_indices: NDArray[np.int64]
     hand_q_indices: NDArray[np.int64]
 

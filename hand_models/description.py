@@ -32,7 +32,7 @@ from hand_models.fields import (
 _SOURCE_KEYS = {"source", "distribution", "package_directories", "base", "without", "fixed"}
 _HAND_KEYS = {*_SOURCE_KEYS, "name", "copies", "arm", "fingers"}
 _ARM_KEYS = {
-    *_SOURCE_KEYS, "prefix", "flange", "position", "rotation_deg", "at", "at_rotation_deg",
+    *_SOURCE_KEYS, "prefix", "flange", "position", "rotation_deg", "at", "at_rotation_deg", "home",
 }  # fmt: skip
 _COPY_KEYS = {"prefix", "position", "rotation_deg"}
 _FINGER_KEYS = {"name", "tip_frame", "pad_centre", "pad_normal", "pad_radius"}
@@ -103,6 +103,7 @@ class ArmDescription:
         flange: The link the hand is mounted on.
         position, rotation_deg: Of the hand base in the flange [m], [deg].
         at, at_rotation_deg: Of the arm's root in the world [m], [deg].
+        home: Where its joints begin, by name, mid-range for the others [rad], [m].
     """
 
     source: SourceDescription
@@ -112,6 +113,7 @@ class ArmDescription:
     rotation_deg: Vector
     at: Vector
     at_rotation_deg: Vector
+    home: Mapping[str, float]
 
 
 @dataclass(frozen=True)
@@ -258,6 +260,7 @@ def _arm(table: object, folder: Path, where: str) -> ArmDescription:
         rotation_deg=vector(table, "rotation_deg", where, _NOWHERE),
         at=vector(table, "at", where, _NOWHERE),
         at_rotation_deg=vector(table, "at_rotation_deg", where, _NOWHERE),
+        home=numbers(table, "home", where),
     )
 
 

@@ -8,6 +8,7 @@ p + pad_radius * n, and its normal within the sensor's cone about -n.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -121,6 +122,13 @@ class Hand:
         """(nq,) configuration in the middle of the limits; unlike q = 0 always within them."""
         return _frozen((self.lower + self.upper) / 2)
 
+    @cached_property
+    def home(self) -> Array:
+        """(nq,) where it begins: an arm at its home, the hand in the middle of its limits."""
+        if self.arm is None:
+            return self.middle
+        return _frozen(self.arm.joined(self.arm.home, self.arm.hand.middle))
+
     def finger(self, name: str) -> Finger:
         """The finger of that name.
 
@@ -206,6 +214,7 @@ def _on_arm(hand: Hand, part: Part, description: ArmDescription) -> Hand:
         flange_id=link_id(arm.model, description.prefix + description.flange),
         X_FB=placed(description.position, description.rotation_deg),
         X_WA=placed(description.at, description.at_rotation_deg),
+        home=_home(arm.model, description.home),
         q_indices=_frozen_indices([at[name] for name, _ in _own_joints(arm.model)]),
         hand_q_indices=own,
     )
@@ -213,6 +222,22 @@ def _on_arm(hand: Hand, part: Part, description: ArmDescription) -> Hand:
     return Hand(
         hand.name, whole.model, whole.shapes, fingers, _frozen(lower), _frozen(upper), carrier
     )
+
+
+def _home(model: pin.Model, chosen: Mapping[str, float]) -> Array:
+    """Joints where the description says, the others in mid-range.
+
+    Raises:
+        HandError: No such joint, or a place outside its limits.
+    """
+    lower, upper = model.lowerPositionLimit, model.upperPositionLimit
+    home, at = (lower + upper) / 2, {name: int(j.idx_q) for name, j in _own_joints(model)}
+    for name, value in chosen.items():
+        if name not in at or not lower[at[name]] <= value <= upper[at[name]]:
+            known = ", ".join(f"{n} {lower[i]:.2f} to {upper[i]:.2f}" for n, i in at.items())
+            raise HandError(f"arm: home has {name} = {value:g}; joints and limits are {known}")
+        home[at[name]] = value
+    return _frozen(home)
 
 
 def _finger(model: pin.Model, description: FingerDescription) -> Finger:

@@ -25,12 +25,13 @@ from planner.retreat import Retreat
 from planner.workspace import Workspace
 
 LIBRARY = 8000  # postures of the arm
-SEEDS = 3  # of them, for each pose
+SEEDS = 8  # of them, for each pose
 STEPS = 25
 REACH = 1.5  # half edge of the box about the arm's root in which the hand is looked for [m]
 JUMP = 0.15  # of a joint between two poses of a way [rad]
 _TURN = 0.2  # an angle counts like its arc of this radius [m]
 _DAMPING = 1e-4  # [m^2]
+_NEAR = 1e-4  # on a way [m], [rad]
 _PLACE, _ANGLE = 1e-3, 1e-2  # how near is there: the optimiser does the rest [m], [rad]
 
 
@@ -63,21 +64,37 @@ class ArmReach:
         _, nearest = tree.query(_features(R, p), SEEDS)
         q = library[nearest.ravel()]
         q, off = self._solved(q, np.repeat(R, SEEDS, axis=0), np.repeat(p, SEEDS, axis=0))
-        best = off.reshape(-1, SEEDS).argmin(axis=1) + SEEDS * np.arange(len(p))
+        far = np.abs(q - self._arm.home).max(axis=1)
+        rank = np.where(off < 1.0, far, 1e3 + off).reshape(-1, SEEDS)  # of those, nearest to home
+        best = rank.argmin(axis=1) + SEEDS * np.arange(len(p))
         return q[best], off[best] < 1.0
 
     def follow(self, q: Array, bases: tuple[pin.SE3, ...]) -> Array:
         """Joint positions (K, n) along poses of the hand base, from q on; they end before the first
         that is out of reach or a jump away."""
         path: list[Array] = []
-        for X in bases:
-            R, p = self._wanted(X.rotation[None], X.translation[None])
-            found, off = self._solved(q[None], R, p)
-            if off[0] > 1.0 or np.abs(found[0] - q).max() > JUMP:
+        data = self._arm.model.createData()
+        for X_WB in bases:
+            X_AF = self._arm.X_WA.inverse() * X_WB * self._arm.X_FB.inverse()
+            found = self._pulled(data, q, X_AF)
+            if found is None or np.abs(found - q).max() > JUMP:
                 break
-            q = found[0]
+            q = found
             path.append(q)
         return np.array(path).reshape(-1, len(self._lower))
+
+    def _pulled(self, data: pin.Data, q: Array, X_AF: pin.SE3) -> Array | None:
+        """Joints that put the flange there, near q; None if they do not come near enough."""
+        model, flange = self._arm.model, self._arm.flange_id
+        for _ in range(STEPS):
+            pin.framesForwardKinematics(model, data, q)
+            error = pin.log6(data.oMf[flange].actInv(X_AF)).vector
+            if np.linalg.norm(error[:3]) < _NEAR and np.linalg.norm(error[3:]) < _NEAR:
+                return q
+            J = pin.computeFrameJacobian(model, data, q, flange, pin.LOCAL)
+            step = J.T @ np.linalg.solve(J @ J.T + _DAMPING * np.eye(6), error)
+            q = np.clip(q + step, self._lower, self._upper)
+        return None
 
     def placements(self, laid: Candidates) -> Candidates:
         """Placements of the hand alone that the arm reaches, as placements of the whole."""

@@ -201,19 +201,28 @@ def _made(
     fault = closing_fault(tools.collision, path, reach, solid)
     if fault is not None:
         return fault
-    bases = way_in(
-        tools.hand, tools.collision, tools.spheres, reach, solid, options.reach,
-        length=options.way_in,
-    )  # fmt: skip
+    bases = _way_in(tools, reach, solid, options)
     if bases is None:
         return "no way in for the open hand"
     if options.start is None:
         return _Made(reach, approaches, path, bases, None)
-    movable = movable_among(tools.hand, tools.collision, solid, options.reach, options.limits)
+    movable = movable_among(tools.hand, tools.collision, solid, tools.rules, options.limits)
     motion = plan_grasp_motion(
         movable, reach, bases, path, BEFORE, options.start, wanted=wall_95(belief)
     )
     return motion if isinstance(motion, str) else _Made(reach, approaches, path, bases, motion)
+
+
+def _way_in(
+    tools: HandTools, reach: Reach, solid: RevolvedSolid, options: GraspOptions
+) -> tuple[pin.SE3, ...] | None:
+    """Base poses to the pre-grasp; an arm's root stands still, its joints are the motion's."""
+    if tools.arm is not None:
+        return (reach.X_WB,)
+    return way_in(
+        tools.hand, tools.collision, tools.spheres, reach, solid, options.reach,
+        length=options.way_in,
+    )  # fmt: skip
 
 
 def _grasp(

@@ -170,7 +170,9 @@ def _outer(
     movable: Movable, way: Retreat, start: Configuration | None
 ) -> tuple[Transfer, Trajectory | None, list[MotionCertificate]] | str:
     """The way to the object and the way out, certified."""
-    leave = timed(movable.hand, "leave", way.path, way.bases, movable.limits)
+    leave = timed(
+        movable.hand, "leave", way.path, way.bases, movable.limits, tips=_tips(movable.hand, way)
+    )
     found = [] if leave is None else [movable.certify(leave)]
     if found and found[0].faults:
         return f"on the way out, {found[0].faults[0]}"
@@ -183,6 +185,13 @@ def _outer(
     if transfer.certificate is not None:
         found.append(transfer.certificate)
     return transfer, leave, found
+
+
+def _tips(hand: Hand, way: Retreat) -> Array | None:
+    """Of all fingers along a way of an arm, (K, F, 3); a free hand's base tells enough."""
+    if hand.arm is None:
+        return None
+    return np.array([hand.at(q, X).pad_centres for q, X in zip(way.path, way.bases, strict=True)])
 
 
 def _guarded_enter(movable: Movable, leave: Trajectory) -> Trajectory:

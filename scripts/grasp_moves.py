@@ -26,10 +26,11 @@ HOME = pin.SE3(pin.rpy.rpyToMatrix(0.0, 1.2, 0.0), np.array([0.15, 0.0, 0.45]))
 
 
 def from_home(hand: Hand, options: PlannerOptions) -> PlannerOptions:
-    """With the hand in the middle of its workspace, or between the robot and the object."""
-    nominal = HOME if options.reach.workspace.X_WB is None else options.reach.workspace.X_WB
-    X_WB = nominal if hand.arm is None else hand.arm.X_WA
-    return replace(options, start=Configuration(hand.middle, X_WB))
+    """With the hand in the middle of its workspace, or between the robot and the object; with an
+    arm where that begins."""
+    nominal = options.reach.workspace.X_WB
+    X_WB = hand.arm.X_WA if hand.arm is not None else HOME if nominal is None else nominal
+    return replace(options, start=Configuration(hand.home, X_WB))
 
 
 def left_at(steps: Sequence[Step], start: Configuration | None) -> Configuration | None:

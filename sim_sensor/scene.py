@@ -116,7 +116,7 @@ def build_scene(hand: Hand, episode: Episode) -> Scene:
             _shown(f"/belief/{i}/after", beat.touch, end),
             _shown(f"/touched/{i}", beat.touch),
         ]
-    camera = _camera(episode)
+    camera = _camera(hand, episode)
     return Scene(tuple(stage), tuple(tracks), beats, duration, camera)
 
 
@@ -214,16 +214,22 @@ def room() -> Iterator[Command]:
     yield set_property("/Background", "bottom_color", [0.80, 0.84, 0.89])
 
 
-def _camera(episode: Episode) -> Camera:
+def _hand_place(hand: Hand, act: Act) -> Array:
+    """Of the hand's own base in the world as an act begins; an arm may carry it."""
+    X_WB = act.bases[0] if hand.arm is None else hand.arm.base_of_hand(act.path[0])
+    return np.asarray(X_WB.translation)
+
+
+def _camera(hand: Hand, episode: Episode) -> Camera:
     """Beside the line from the object to the hand, raised, on the side that is touched."""
-    hand = np.mean([act.bases[0].translation for act in episode.acts], axis=0) - episode.centre
-    side = np.cross([0.0, 0.0, 1.0], hand)
+    behind = np.mean([_hand_place(hand, act) for act in episode.acts], axis=0) - episode.centre
+    side = np.cross([0.0, 0.0, 1.0], behind)
     side = unit(side) if np.linalg.norm(side) > 0.02 else np.array([0.0, -1.0, 0.0])
     touched = np.mean([_place(act) for act in episode.acts], axis=0) - episode.centre
     side *= 1.0 if touched @ side >= 0 else -1.0
-    away = unit(side + 0.3 * unit(hand) + np.array([0.0, 0.0, 0.4]))
+    away = unit(side + 0.3 * unit(behind) + np.array([0.0, 0.0, 0.4]))
     # a little below the middle: the caption covers the bottom of the picture
-    target = episode.centre + 0.3 * hand - np.array([0.0, 0.0, 0.04])
+    target = episode.centre + 0.3 * behind - np.array([0.0, 0.0, 0.04])
     comes = any(act.motion is not None for act in episode.acts)  # from farther away
     distance = episode.half_height + (0.52 if comes else 0.40)
     return Camera(frozen(target + distance * away), frozen(target))
