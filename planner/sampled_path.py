@@ -59,20 +59,39 @@ def sampled_path(
         margin: Least distance of the hand from the believed object [m].
         checks: How many configurations may be checked.
     """
-    weight = _JOINT_WEIGHT if movable.hand.arm is None else _ARM_WEIGHT
-    every = _Joints(movable.hand.lower, movable.hand.upper, (begin.q, end.q), weight, lambda q: q)
-    along = end.q - begin.q
-    line = _Joints(
-        np.zeros(1), np.ones(1), (np.zeros(1), np.ones(1)),
-        max(_JOINT_WEIGHT * float(np.linalg.norm(along)), 1e-3), lambda u: begin.q + u * along,
-    )  # fmt: skip
-    on_line = (line.posture(np.array([u])) for u in np.linspace(0.0, 1.0, _ON_LINE))
-    is_self_free = movable.around.collision.is_self_free
-    if not movable.base_stays and all(is_self_free(q) for q in on_line):
-        found = _search(movable, (begin, end), line, margin, checks // 2)
+    few = _along_line(movable, begin.q, end.q)
+    if few is not None:
+        found = _search(movable, (begin, end), few, margin, checks // 2)
         if found is not None:
             return found
+    weight = _JOINT_WEIGHT if movable.hand.arm is None else _ARM_WEIGHT
+    every = _Joints(movable.hand.lower, movable.hand.upper, (begin.q, end.q), weight, lambda q: q)
     return _search(movable, (begin, end), every, margin, checks)
+
+
+def _along_line(movable: Movable, begin: Array, end: Array) -> _Joints | None:
+    """The hand's joints as one share of their straight line, the arm's as they are, if there is
+    one; None where nothing else moves or the hand would meet itself on the line."""
+    hand, along = movable.hand, end - begin
+    arm = [] if hand.arm is None else [int(i) for i in hand.arm.q_indices]
+    if movable.base_stays and not arm:
+        return None
+
+    def posture(vector: Array) -> Array:
+        q = begin + vector[-1] * along
+        q[arm] = vector[:-1]
+        return np.asarray(q)
+
+    on_line = (begin + u * along for u in np.linspace(0.0, 1.0, _ON_LINE))
+    if not arm and not all(movable.around.collision.is_self_free(q) for q in on_line):
+        return None
+    return _Joints(
+        np.append(hand.lower[arm], 0.0),
+        np.append(hand.upper[arm], 1.0),
+        (np.append(begin[arm], 0.0), np.append(end[arm], 1.0)),
+        _ARM_WEIGHT if arm else max(_JOINT_WEIGHT * float(np.linalg.norm(along)), 1e-3),
+        posture,
+    )
 
 
 def _search(

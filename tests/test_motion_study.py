@@ -3,12 +3,14 @@
 import numpy as np
 import pinocchio as pin
 import pytest
+from grasp_moves import from_home
 from motion_study import beyond, draw_scene, refusals, study
 from raw_meshes import RawMeshes
 
 from estimator.axis import Axis
 from estimator.surface import SurfaceOfRevolution
 from hand_models import load_hand
+from planner.options import PlannerOptions
 from planner.surroundings import Box
 from planner.timing import MotionLimits, timed
 from planner.trajectory import between
@@ -71,3 +73,10 @@ def test_scenes_leave_room_for_the_hand(seed):
     scene = draw_scene(HAND, np.random.default_rng([seed, 6]))
     around = RawMeshes(HAND, scene.belief.surface, scene.boxes, scene.table)
     assert around.meeting(scene.start.q, scene.start.X_WB) is None
+
+
+def test_an_arm_starts_from_its_own_root():
+    arm = load_hand("allegro_right_panda")
+    start = from_home(arm, PlannerOptions()).start
+    assert start.X_WB.isApprox(arm.arm.X_WA, 1e-12)
+    assert from_home(HAND, PlannerOptions()).start.q.shape == (16,)
