@@ -2,13 +2,13 @@
 
 from planner.explore import Step, explore
 from planner.goal import Goal
+from planner.motions.surroundings import Box
+from planner.motions.timing import MotionLimits
+from planner.motions.trajectory import Configuration, Trajectory
 from planner.options import PlannerOptions
 from planner.plan import NoPlan, Plan, Probe, plan_probes
-from planner.reach_task import ReachOptions
-from planner.surroundings import Box
-from planner.timing import MotionLimits
-from planner.trajectory import Configuration, Trajectory
-from planner.workspace import Workspace
+from planner.reaching.reach_task import ReachOptions
+from planner.reaching.workspace import Workspace
 
 __all__ = [
     "Box",

@@ -19,9 +19,9 @@ from estimator.vectors import Array, Index, Mask, unit
 from hand_models.batch import batch_placements
 from hand_models.hand import Hand
 from hand_models.spheres import LinkSpheres
-from planner.laying import Laid, lay
-from planner.reach_map import ReachMap
-from planner.workspace import Workspace
+from planner.reaching.laying import Laid, lay
+from planner.reaching.reach_map import ReachMap
+from planner.reaching.workspace import Workspace
 
 END_MARGIN = 0.08  # of the believed height, kept from both ends
 FITTING = 5  # steps from a cylinder to the believed surface

@@ -19,13 +19,13 @@ import numpy as np
 from estimator.belief import Belief
 from estimator.contact import Contact, Miss, SensorNoise
 from hand_models.hand import Hand
+from planner.choosing.risk import MISSED
 from planner.goal import Goal
+from planner.motions.trajectory import Configuration
 from planner.next_touch import next_touch
 from planner.options import PlannerOptions
 from planner.plan import NoPlan, Plan, Probe, plan_probes
-from planner.risk import MISSED
 from planner.surprise import Learnt, learn
-from planner.trajectory import Configuration
 
 UNLIKELY = 0.5  # chance of a miss from which a placement is not worth its three touches
 TELLING_TRIES = 6  # best single touches that are handed to the optimiser

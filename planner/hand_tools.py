@@ -14,13 +14,13 @@ from hand_models.collision import HandCollision
 from hand_models.hand import Hand
 from hand_models.postures import Postures, posture_library
 from hand_models.spheres import LinkSpheres, link_spheres
-from planner.arm_reach import ArmReach
 from planner.candidates import Candidates, placement_candidates, single_candidates
-from planner.reach import Reach, ReachSolver
-from planner.reach_map import ReachMap
-from planner.reach_task import ReachOptions
-from planner.retreat import Retreat, ways_out
-from planner.workspace import Workspace
+from planner.motions.retreat import Retreat, ways_out
+from planner.reaching.arm_reach import ArmReach
+from planner.reaching.reach import Reach, ReachSolver
+from planner.reaching.reach_map import ReachMap
+from planner.reaching.reach_task import ReachOptions
+from planner.reaching.workspace import Workspace
 
 
 @dataclass(frozen=True, eq=False)

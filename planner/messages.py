@@ -18,11 +18,11 @@ import pinocchio as pin
 from estimator.contact import Contact, Miss
 from estimator.records import axis_record, contact_record, estimate_record
 from hand_models.hand import Hand
+from planner.choosing.optimum import ChoiceCertificate
 from planner.explore import Step
-from planner.grasp_outcome import Grasp
-from planner.optimum import ChoiceCertificate
+from planner.grasping.grasp_outcome import Grasp
 from planner.plan import Plan, Probe
-from planner.reach import Reach
+from planner.reaching.reach import Reach
 from planner.trajectory_messages import motion_record
 
 

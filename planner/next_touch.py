@@ -19,7 +19,7 @@ from estimator.telling import telling_worth
 from estimator.vectors import Array, Index
 from hand_models.hand import Hand
 from planner.candidates import Candidates
-from planner.choice import Ranking
+from planner.choosing.choice import Ranking
 from planner.goal import Goal
 from planner.options import PlannerOptions
 from planner.plan import Plan, Probe, plan_preferred

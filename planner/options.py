@@ -7,12 +7,12 @@ from typing import get_args
 
 import numpy as np
 
-from planner.choice import MARGIN
-from planner.criteria import Criterion
-from planner.motion import FORCE_GOAL
-from planner.reach_task import ReachOptions
-from planner.timing import MotionLimits
-from planner.trajectory import Configuration
+from planner.choosing.choice import MARGIN
+from planner.choosing.criteria import Criterion
+from planner.motions.motion import FORCE_GOAL
+from planner.motions.timing import MotionLimits
+from planner.motions.trajectory import Configuration
+from planner.reaching.reach_task import ReachOptions
 
 OFFSET_GUARD = float(np.deg2rad(5.0))
 
@@ -30,15 +30,15 @@ class PlannerOptions:
         tries: How many of the best placements are handed to the optimiser.
         offset_guard: Common rotation of the directions that a plan is proof against, whether the
             sensor admits one or not [rad]: contacts that wrap around cancel it.
-        criterion: By what placements are put in order: `planner.criteria` says what each means.
+        criterion: By what placements are put in order: see `planner.choosing.criteria`.
         grasp_height: Where along the believed axis the offset counts, from its point: the place
             of the later grasp [m].
         sweep: Whether every triple that the fingers reach from the best placements is scored, too
-            (`planner.sweep`); criterion `information` only.
+            (`planner.choosing.sweep`); criterion `information` only.
         certify: Whether a plan says how good it is among all touches that there are.
         force_goal: At which a touching finger stops [N].
-        start: Where the hand is; motions are planned from there (`planner.round_motion`), and a
-            placement that none leads to is refused. None plans no motions.
+        start: Where the hand is; motions are planned from there (`planner.motions.round_motion`),
+            and a placement that none leads to is refused. None plans no motions.
         limits: Of speed and acceleration.
     """
 

@@ -16,23 +16,23 @@ from estimator.surface import Place, SurfaceOfRevolution
 from estimator.vectors import Index, frozen
 from hand_models.hand import Hand
 from planner.candidates import Candidates
-from planner.choice import Ranking, rank
+from planner.choosing.choice import Ranking, rank
+from planner.choosing.optimum import certificate, value_at
+from planner.choosing.risk import risks
+from planner.choosing.sweep import FROM, swept, with_swept
+from planner.choosing.worth import Worth, guarded
 from planner.funnel import Funnel
 from planner.goal import Goal
 from planner.hand_tools import HandTools, hand_tools
-from planner.motion import Approach, approach_by_base, plan_approaches
-from planner.optimum import certificate, value_at
+from planner.motions.motion import Approach, approach_by_base, plan_approaches
+from planner.motions.retreat import Retreat
+from planner.motions.round_motion import RoundMotion, plan_round
+from planner.motions.transfer import movable_among
 from planner.options import PlannerOptions
 from planner.plan_types import NoPlan, Plan, Probe
-from planner.reach import Reach, Unreachable
-from planner.retreat import Retreat
-from planner.risk import risks
-from planner.round_motion import RoundMotion, plan_round
-from planner.solid import RevolvedSolid, believed_solid
-from planner.starts import Start
-from planner.sweep import FROM, swept, with_swept
-from planner.transfer import movable_among
-from planner.worth import Worth, guarded
+from planner.reaching.reach import Reach, Unreachable
+from planner.reaching.solid import RevolvedSolid, believed_solid
+from planner.reaching.starts import Start
 
 __all__ = ["NoPlan", "Plan", "Probe", "plan_preferred", "plan_probes"]
 

@@ -8,13 +8,13 @@ from estimator.bounds import AxisBound
 from estimator.contact import Contact
 from estimator.surface import Place
 from estimator.vectors import Array
+from planner.choosing.optimum import ChoiceCertificate
+from planner.choosing.risk import Risk
 from planner.funnel import Funnel, in_words
-from planner.motion import Approach
-from planner.optimum import ChoiceCertificate
-from planner.reach import Reach
-from planner.retreat import Retreat
-from planner.risk import Risk
-from planner.round_motion import RoundMotion
+from planner.motions.motion import Approach
+from planner.motions.retreat import Retreat
+from planner.motions.round_motion import RoundMotion
+from planner.reaching.reach import Reach
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +72,7 @@ class Plan:
     motion: RoundMotion | None = None
 
     def chance_of(self, name: str) -> float:
-        """Of one of the risks (`planner.risk` names them); 0 where it is not worth saying."""
+        """Of a risk that `planner.choosing.risk` names; 0 where it is not worth saying."""
         return next((risk.chance for risk in self.risks if risk.name == name), 0.0)
 
 

@@ -14,10 +14,10 @@ import pinocchio as pin
 
 from hand_models.collision import LinkPair
 from hand_models.hand import Hand
-from planner.grasp_travel import GraspMotion
-from planner.motion_certificate import MotionCertificate
-from planner.round_motion import RoundMotion
-from planner.trajectory import Array, Trajectory
+from planner.grasping.grasp_travel import GraspMotion
+from planner.motions.motion_certificate import MotionCertificate
+from planner.motions.round_motion import RoundMotion
+from planner.motions.trajectory import Array, Trajectory
 
 DIGITS = 6  # of an angle or length: a microradian, a micrometre
 WORLD, BASE = "world", "hand_base"

@@ -35,7 +35,7 @@ from rich.table import Table
 
 from estimator.sensors import sensor_noise
 from hand_models import load_hand
-from planner.criteria import Criterion
+from planner.choosing.criteria import Criterion
 from sim_sensor.objects import load_object
 
 CRITERIA: tuple[Criterion, ...] = ("information", "pair-bound", "d-optimal", "uniform", "random")

@@ -40,7 +40,7 @@ from planner.plan import NoPlan, Probe
 from sim_sensor.camera import coarse_view
 from sim_sensor.noise import simulated_sensor
 from sim_sensor.objects import load_object
-from sim_sensor.raw_sense import raw_sense
+from sim_sensor.signals.raw_sense import raw_sense
 from sim_sensor.world import World
 
 GOAL = Goal(float(np.deg2rad(3.0)), 2e-3)

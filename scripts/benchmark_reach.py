@@ -30,11 +30,11 @@ from hand_models import HandError, known_hands, load_hand
 from hand_models.collision import HandCollision
 from hand_models.hand import Hand
 from hand_models.spheres import link_spheres
-from planner.inspection import inspect
-from planner.reach import Reach, ReachSolver
-from planner.reach_task import ReachOptions, ReachTask, Solution
-from planner.solid import RevolvedSolid
-from planner.starts import Start, StartSearch
+from planner.reaching.inspection import inspect
+from planner.reaching.reach import Reach, ReachSolver
+from planner.reaching.reach_task import ReachOptions, ReachTask, Solution
+from planner.reaching.solid import RevolvedSolid
+from planner.reaching.starts import Start, StartSearch
 
 HALF_HEIGHT = 0.09  # of the cylinders [m]
 WARM = 4  # targets before the clock runs

@@ -25,9 +25,9 @@ from estimator.readers.strain import read_strains
 from estimator.readers.strain_array import StrainArray
 from estimator.readers.strain_model import predicted_readings, touch_state
 from estimator.vectors import Array
-from sim_sensor.gel import GelPad
-from sim_sensor.gel_shape import arc_patches
-from sim_sensor.tactels import StrainFinger
+from sim_sensor.signals.gel import GelPad
+from sim_sensor.signals.gel_shape import arc_patches
+from sim_sensor.signals.tactels import StrainFinger
 
 REPEATS = 5
 WINDOW = StrainArray(tactels=(4, 4))

@@ -38,7 +38,7 @@ from touch_sessions import ARMS, SETTINGS, Job, Outcome, run
 from estimator.sensors import sensor_noise
 from estimator.vectors import Array
 from hand_models import load_hand
-from planner.choice import MARGIN
+from planner.choosing.choice import MARGIN
 
 
 @dataclass(frozen=True)

@@ -23,11 +23,11 @@ from estimator.profile import Profile, barrel, cone, cylinder, spline_through
 from estimator.surface import SurfaceOfRevolution
 from estimator.vectors import Array
 from planner.candidates import END_MARGIN
-from planner.choice import MARGIN
+from planner.choosing.choice import MARGIN
+from planner.choosing.optimum import best_touches, place_grid
+from planner.choosing.prospects import prospects
+from planner.choosing.worth import Worth
 from planner.goal import Goal
-from planner.optimum import best_touches, place_grid
-from planner.prospects import prospects
-from planner.worth import Worth
 from sim_sensor.camera import coarse_view
 
 _DEG = float(np.pi / 180.0)

@@ -23,13 +23,13 @@ from estimator.vectors import Array
 from hand_models import load_hand
 from hand_models.hand import Hand
 from planner.candidates import END_MARGIN, Candidates
-from planner.choice import MARGIN, rank
-from planner.criteria import Criterion
+from planner.choosing.choice import MARGIN, rank
+from planner.choosing.criteria import Criterion
+from planner.choosing.prospects import BEFORE, BEHIND
 from planner.explore import explore
 from planner.goal import Goal
 from planner.options import OFFSET_GUARD, PlannerOptions
 from planner.plan import NoPlan, Probe
-from planner.prospects import BEFORE, BEHIND
 from sim_sensor.camera import coarse_view
 from sim_sensor.noise import simulated_sensor
 from sim_sensor.objects import load_object

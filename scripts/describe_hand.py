@@ -27,7 +27,7 @@ from rich.markup import escape
 from hand_models import load_hand
 from hand_models.hand import Hand
 from hand_models.proposal import Proposal, propose_description
-from sim_sensor.hand_page import write_hand_page
+from sim_sensor.viewer.hand_page import write_hand_page
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,9 @@ from rich.table import Table
 from estimator.belief import Belief
 from estimator.surface import SurfaceOfRevolution
 from hand_models.hand import Hand
-from planner.grasp import Grasp, GraspOptions, Hold, NoGrasp, closes_on, plan_grasp
-from planner.grasp_motion import closed_posture
-from sim_sensor.episode import Grip
+from planner.grasping.grasp import Grasp, GraspOptions, Hold, NoGrasp, closes_on, plan_grasp
+from planner.grasping.grasp_motion import closed_posture
+from sim_sensor.viewer.episode import Grip
 
 CLOSING = 8  # postures between open and closed on the page
 

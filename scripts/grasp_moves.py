@@ -10,14 +10,14 @@ import pinocchio as pin
 
 from hand_models.hand import Hand
 from planner.explore import Step
-from planner.grasp import Grasp
-from planner.grasp_travel import GraspMotion, closing_motion
+from planner.grasping.grasp import Grasp
+from planner.grasping.grasp_travel import GraspMotion, closing_motion
+from planner.motions.round_motion import withdrawal
+from planner.motions.timing import MotionLimits
+from planner.motions.trajectory import Array, Configuration, Trajectory
 from planner.options import PlannerOptions
-from planner.round_motion import withdrawal
-from planner.timing import MotionLimits
-from planner.trajectory import Array, Configuration, Trajectory
-from sim_sensor.episode import Grip
-from sim_sensor.moves import ActMotion, Move
+from sim_sensor.viewer.episode import Grip
+from sim_sensor.viewer.moves import ActMotion, Move
 from sim_sensor.world import TouchRecord
 
 FRAME = 0.05  # between postures that are shown [s]

@@ -17,22 +17,22 @@ from estimator.readers.raw_files import RawTouches
 from estimator.readers.raw_sensors import DepthPad, raw_sensor
 from estimator.records import estimate_record
 from estimator.surface import SurfaceOfRevolution
+from planner.choosing.risk import risks_in_words
 from planner.explore import Step
-from planner.grasp_travel import GraspMotion
+from planner.grasping.grasp_travel import GraspMotion
 from planner.messages import step_record
+from planner.motions.round_motion import RoundMotion
 from planner.plan import Probe
-from planner.risk import risks_in_words
-from planner.round_motion import RoundMotion
-from sim_sensor.episode import Act, BelievedAxis, Episode, Grip
 from sim_sensor.feeling import Felt
-from sim_sensor.moves import ActMotion
-from sim_sensor.pictures import Signal
+from sim_sensor.viewer.episode import Act, BelievedAxis, Episode, Grip
+from sim_sensor.viewer.moves import ActMotion
+from sim_sensor.viewer.pictures import Signal
 from sim_sensor.world import TouchRecord, World
 
 Motions = Callable[[Step, Sequence[TouchRecord]], Sequence[ActMotion | None]]
 
 if TYPE_CHECKING:
-    from sim_sensor.mujoco_world import MujocoWorld
+    from sim_sensor.physics.mujoco_world import MujocoWorld
 
 
 def print_round(console: Console, step: Step, number: int) -> None:

@@ -43,11 +43,11 @@ from hand_models.collision import HandCollision
 from hand_models.hand import Hand
 from planner.explore import explore
 from planner.goal import Goal
-from planner.grasp import Grasp, NoGrasp, plan_grasp
-from planner.grasp_motion import closed_posture
-from planner.grasp_quality import contact_wrenches, ferrari_canny
+from planner.grasping.grasp import Grasp, NoGrasp, plan_grasp
+from planner.grasping.grasp_motion import closed_posture
+from planner.grasping.grasp_quality import contact_wrenches, ferrari_canny
 from planner.plan import NoPlan, Probe
-from planner.solid import RevolvedSolid
+from planner.reaching.solid import RevolvedSolid
 from sim_sensor.camera import coarse_view
 from sim_sensor.noise import simulated_sensor
 from sim_sensor.objects import load_object

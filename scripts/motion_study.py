@@ -39,12 +39,12 @@ from estimator.surface import SurfaceOfRevolution
 from hand_models import HandError, load_hand
 from hand_models.hand import Hand
 from planner.goal import Goal
+from planner.motions.surroundings import Box
+from planner.motions.timing import MotionLimits
+from planner.motions.trajectory import Configuration, Trajectory, between
 from planner.options import PlannerOptions
 from planner.plan import NoPlan, Plan, plan_probes
-from planner.reach_task import ReachOptions
-from planner.surroundings import Box
-from planner.timing import MotionLimits
-from planner.trajectory import Configuration, Trajectory, between
+from planner.reaching.reach_task import ReachOptions
 from sim_sensor.camera import coarse_view
 from sim_sensor.objects import load_object
 

@@ -22,9 +22,9 @@ from planner.explore import Step, explore
 from planner.goal import Goal
 from planner.plan import NoPlan, Plan, Probe, plan_probes
 from sim_sensor.camera import coarse_view
-from sim_sensor.mujoco_models import Models, Standing, build_models
-from sim_sensor.mujoco_world import SENSOR, MujocoRecord, MujocoWorld
 from sim_sensor.objects import load_object
+from sim_sensor.physics.mujoco_models import Models, Standing, build_models
+from sim_sensor.physics.mujoco_world import SENSOR, MujocoRecord, MujocoWorld
 from sim_sensor.world import World
 
 NODES = 41  # of a profile that is known

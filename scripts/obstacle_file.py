@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from planner.surroundings import Box
+from planner.motions.surroundings import Box
 
 TABLE, BOX = {"table_mm", "box"}, {"name", "centre_mm", "size_mm", "yaw_deg"}
 

@@ -11,8 +11,8 @@ from paper_sensor import DEPTH_MM, RADII, REPEATS, body
 from estimator.readers.strain import read_strains
 from estimator.readers.strain_array import StrainArray
 from estimator.vectors import unit
-from sim_sensor.tactel_imperfections import StrainImperfections
-from sim_sensor.tactels import StrainFinger
+from sim_sensor.signals.tactel_imperfections import StrainImperfections
+from sim_sensor.signals.tactels import StrainFinger
 
 Array = NDArray[np.float64]
 

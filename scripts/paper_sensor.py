@@ -18,7 +18,7 @@ from estimator.readers.hertz import contact_ellipse
 from estimator.readers.strain import read_strains
 from estimator.readers.strain_array import StrainArray
 from estimator.readers.strain_model import reading_slopes, touch_state
-from sim_sensor.tactels import StrainFinger
+from sim_sensor.signals.tactels import StrainFinger
 
 Array = NDArray[np.float64]
 

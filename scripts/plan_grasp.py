@@ -49,18 +49,18 @@ from hand_models import HandError, load_hand
 from hand_models.hand import Hand
 from planner.explore import Step, explore
 from planner.goal import Goal
-from planner.grasp import Friction, GraspOptions
+from planner.grasping.grasp import Friction, GraspOptions
 from planner.messages import plan_document
 from planner.options import PlannerOptions
 from planner.plan import NoPlan, Probe
-from planner.workspace import Workspace
+from planner.reaching.workspace import Workspace
 from sim_sensor.camera import coarse_view
 from sim_sensor.objects import load_object
-from sim_sensor.view import write_page
+from sim_sensor.viewer.view import write_page
 from sim_sensor.world import World
 
 if TYPE_CHECKING:
-    from sim_sensor.mujoco_world import MujocoWorld
+    from sim_sensor.physics.mujoco_world import MujocoWorld
 
 
 @dataclass(frozen=True)

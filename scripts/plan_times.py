@@ -84,7 +84,7 @@ def _shares(stats: pstats.Stats) -> dict[str, float]:
     spent: dict[tuple[str, str], float] = {}
     for (file, _, function), (_, _, _, cumulative, _) in stats.stats.items():  # type: ignore[attr-defined]
         path = Path(file)
-        if path.parent.name == "planner":
+        if "planner" in path.parts:
             spent[path.stem, function] = spent.get((path.stem, function), 0.0) + cumulative
     whole = spent["plan", "plan_probes"]
     shares = {

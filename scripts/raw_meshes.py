@@ -17,8 +17,8 @@ import pinocchio as pin
 from estimator.surface import SurfaceOfRevolution
 from estimator.vectors import Array
 from hand_models.hand import Hand
-from planner.surroundings import Box
-from sim_sensor.meshes import lathe_mesh
+from planner.motions.surroundings import Box
+from sim_sensor.viewer.meshes import lathe_mesh
 
 OBJECT = "the object"
 

@@ -18,7 +18,7 @@ from hand_models.assembly import assembled
 from hand_models.description import read_description
 from hand_models.hand import Hand
 from hand_models.part import Part, coupled, grafted
-from planner.starts import Start
+from planner.reaching.starts import Start
 
 Array = np.ndarray
 Guess = tuple[Array, pin.SE3]

@@ -34,13 +34,13 @@ from estimator.vectors import Index, frozen
 from hand_models import load_hand
 from hand_models.hand import Hand
 from planner.candidates import Candidates
-from planner.choice import Ranking
+from planner.choosing.choice import Ranking
+from planner.choosing.prospects import prospects
+from planner.choosing.worth import Worth
 from planner.explore import Step, explore
 from planner.goal import Goal
 from planner.options import Criterion, PlannerOptions
 from planner.plan import NoPlan, Preference, Probe, plan_preferred, plan_probes
-from planner.prospects import prospects
-from planner.worth import Worth
 from sim_sensor.camera import coarse_view
 from sim_sensor.noise import Session as SensorSession
 from sim_sensor.noise import simulated_sensor

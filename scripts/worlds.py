@@ -21,11 +21,11 @@ from estimator.surface import SurfaceOfRevolution
 from hand_models.hand import Hand
 from sim_sensor.mesh_objects import SUFFIXES, read_mesh
 from sim_sensor.noise import simulated_sensor
-from sim_sensor.raw_sense import raw_sense
+from sim_sensor.signals.raw_sense import raw_sense
 from sim_sensor.world import World
 
 if TYPE_CHECKING:
-    from sim_sensor.mujoco_world import MujocoWorld
+    from sim_sensor.physics.mujoco_world import MujocoWorld
 
 WORLDS = ("own", "mujoco", "mujoco-table")
 _DEFAULT, _OF_MUJOCO = "gel", "gel-depth"
@@ -65,8 +65,8 @@ def build_world(
             return World(surface, raw_sense(sensor, surface, rng=rng), rng=rng)
         return World(surface, simulated_sensor(sensor).session(rng=rng), rng=rng)
     try:
-        from sim_sensor.mujoco_models import Standing
-        from sim_sensor.mujoco_world import MujocoWorld
+        from sim_sensor.physics.mujoco_models import Standing
+        from sim_sensor.physics.mujoco_world import MujocoWorld
     except ImportError as error:
         raise ValueError(f"--world {world}: needs the extra 'mujoco' ({error})") from None
     standing = Standing() if world == "mujoco-table" else None

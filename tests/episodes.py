@@ -10,9 +10,9 @@ from estimator.contact import Contact, Miss
 from estimator.surface import Place, SurfaceOfRevolution
 from estimator.vectors import Array, basis_across
 from hand_models.hand import Hand
-from sim_sensor.episode import Act, BelievedAxis, Episode
 from sim_sensor.noise import simulated_sensor
 from sim_sensor.objects import load_object
+from sim_sensor.viewer.episode import Act, BelievedAxis, Episode
 
 TRUE_AXIS = Axis([0.45, 0.05, 0.25], [0.15, -0.1, 1.0])
 

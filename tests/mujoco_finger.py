@@ -10,7 +10,7 @@ import numpy as np
 from estimator.local_surface import LocalSurface
 from estimator.readers.raw_sensors import raw_sensor, with_depth
 from estimator.vectors import Array, basis_across, unit
-from sim_sensor.mujoco_skin import PITCH, add_skin, feel, settle_skins
+from sim_sensor.physics.mujoco_skin import PITCH, add_skin, feel, settle_skins
 
 RADIUS = 0.012
 SHAPES = {

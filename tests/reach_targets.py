@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from planner.solid import RevolvedSolid
+from planner.reaching.solid import RevolvedSolid
 
 HALF = 0.09
 SHAPES = ("cylinder", "cone", "barrel", "bottle")

@@ -9,7 +9,7 @@ from estimator.prior import coarse_prior
 from estimator.sensors import SENSORS
 from hand_models import load_hand
 from planner.goal import Goal
-from planner.motion import SPACING, approach_by_base
+from planner.motions.motion import SPACING, approach_by_base
 from planner.options import PlannerOptions
 from planner.plan import plan_probes
 

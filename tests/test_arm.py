@@ -14,10 +14,10 @@ from hand_models import HandError, load_hand
 from hand_models.batch import batch_placements
 from hand_models.collision import HandCollision
 from hand_models.spheres import link_spheres
-from planner.arm_reach import ArmReach
 from planner.goal import Goal
 from planner.options import PlannerOptions
 from planner.plan import plan_probes
+from planner.reaching.arm_reach import ArmReach
 from sim_sensor.camera import coarse_view
 from sim_sensor.objects import load_object
 

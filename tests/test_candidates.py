@@ -12,8 +12,8 @@ from hand_models.batch_pads import batch_pads
 from hand_models.postures import posture_library
 from planner.candidates import GAP, placement_candidates, single_candidates
 from planner.hand_tools import hand_tools
-from planner.reach_task import ReachOptions
-from planner.workspace import Workspace
+from planner.reaching.reach_task import ReachOptions
+from planner.reaching.workspace import Workspace
 
 AXIS = Axis(np.array([0.5, 0.1, 0.2]), np.array([0.1, -0.2, 0.9]))
 CONE = np.deg2rad(40.0)

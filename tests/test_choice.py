@@ -13,9 +13,9 @@ from estimator.profile import cylinder
 from estimator.sensors import SENSORS
 from estimator.surface import Place, SurfaceOfRevolution
 from planner.candidates import Candidates
-from planner.choice import rank
+from planner.choosing.choice import rank
+from planner.choosing.prospects import BEFORE, BEHIND, prospects
 from planner.goal import Goal
-from planner.prospects import BEFORE, BEHIND, prospects
 
 AXIS = Axis(np.array([0.5, 0.1, 0.2]), np.array([0.1, -0.2, 0.9]))
 GOAL = Goal(np.deg2rad(3.0), 2e-3)

@@ -10,12 +10,12 @@ from estimator.belief import coarse_belief, sample_objects
 from estimator.prior import coarse_prior
 from estimator.sensors import SENSORS
 from planner.candidates import Candidates
-from planner.choice import rank
+from planner.choosing.choice import rank
+from planner.choosing.optimum import best_touches, certificate, place_grid, refined
+from planner.choosing.prospects import prospects
+from planner.choosing.risk import AMBIGUOUS, MISSED, risks, risks_in_words
+from planner.choosing.worth import Worth, guarded
 from planner.goal import Goal
-from planner.optimum import best_touches, certificate, place_grid, refined
-from planner.prospects import prospects
-from planner.risk import AMBIGUOUS, MISSED, risks, risks_in_words
-from planner.worth import Worth, guarded
 
 GOAL = Goal(np.deg2rad(3.0), 2e-3)
 GUARD = float(np.deg2rad(5.0))

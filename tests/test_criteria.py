@@ -10,8 +10,8 @@ from estimator.profile import cylinder
 from estimator.sensors import SENSORS
 from estimator.surface import Place, SurfaceOfRevolution
 from planner.candidates import Candidates
-from planner.choice import rank
-from planner.criteria import REFUSING
+from planner.choosing.choice import rank
+from planner.choosing.criteria import REFUSING
 from planner.goal import Goal
 
 AXIS = Axis(np.array([0.5, 0.1, 0.2]), np.array([0.1, -0.2, 0.9]))

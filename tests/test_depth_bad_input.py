@@ -6,8 +6,8 @@ import pytest
 from estimator.readers.depth import read_depth
 from estimator.readers.depth_noise import DepthNoise, noise_of_frames
 from estimator.readers.depth_normals import read_normals
-from sim_sensor.gel import GelPad
-from sim_sensor.gel_shape import arc_patches
+from sim_sensor.signals.gel import GelPad
+from sim_sensor.signals.gel_shape import arc_patches
 
 PITCH = 0.25e-3
 NOISE = DepthNoise(correlated=0.03e-3, length=1.5e-3)

@@ -11,8 +11,8 @@ from scipy.stats import chi2
 from estimator.local_surface import misplaced
 from estimator.readers.depth import read_depth
 from estimator.readers.depth_noise import DepthNoise
-from sim_sensor.gel import GelPad
-from sim_sensor.gel_shape import arc_patches
+from sim_sensor.signals.gel import GelPad
+from sim_sensor.signals.gel_shape import arc_patches
 
 QUIET = {"thickness": np.inf, "gain": 0.0, "offset": 0.0, "misplaced": 0.0, "misturned": 0.0}
 NOISES = {

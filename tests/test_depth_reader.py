@@ -12,9 +12,9 @@ from estimator.readers.depth_noise import DepthNoise, noise_of_frames
 from estimator.readers.depth_normals import read_normals
 from estimator.readers.depth_reading import covariance_into
 from estimator.surface import SurfaceOfRevolution
-from sim_sensor.gel import GelPad
-from sim_sensor.gel_noise import depth_noise
-from sim_sensor.gel_shape import arc_patches, patches_on
+from sim_sensor.signals.gel import GelPad
+from sim_sensor.signals.gel_noise import depth_noise
+from sim_sensor.signals.gel_shape import arc_patches, patches_on
 
 QUIET = {"correlated": 0.0, "gain": 0.0, "offset": 0.0, "misplaced": 0.0, "misturned": 0.0}
 SOFT = DepthNoise(white=1e-6, correlated=0.0)

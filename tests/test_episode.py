@@ -14,11 +14,11 @@ from episodes import TRUE_AXIS, episode_of
 from estimator.axis import from_chart, to_chart
 from estimator.vectors import basis_across
 from hand_models.hand import Hand, load_hand
-from sim_sensor.episode import Act, BelievedAxis, Episode, Grip
-from sim_sensor.meshes import tube_mesh
-from sim_sensor.moves import ActMotion, Move
-from sim_sensor.timeline import STAY, captions, end_of, postures, schedule
-from sim_sensor.view import write_page
+from sim_sensor.viewer.episode import Act, BelievedAxis, Episode, Grip
+from sim_sensor.viewer.meshes import tube_mesh
+from sim_sensor.viewer.moves import ActMotion, Move
+from sim_sensor.viewer.timeline import STAY, captions, end_of, postures, schedule
+from sim_sensor.viewer.view import write_page
 
 
 @pytest.fixture(scope="module")

@@ -16,8 +16,8 @@ from planner.explore import explore
 from planner.goal import Goal
 from planner.options import PlannerOptions
 from planner.plan import NoPlan, plan_probes
-from planner.reach_task import ReachOptions
-from planner.workspace import Workspace
+from planner.reaching.reach_task import ReachOptions
+from planner.reaching.workspace import Workspace
 from sim_sensor.camera import coarse_view
 from sim_sensor.noise import simulated_sensor
 from sim_sensor.objects import load_object

@@ -9,9 +9,9 @@ from estimator.axis import Axis
 from estimator.profile import barrel, cylinder, sphere
 from estimator.readers.hertz import ellipse_curvatures, indentation
 from estimator.surface import SurfaceOfRevolution
-from sim_sensor.gel import GelPad
-from sim_sensor.gel_contact import free_surface, outside
-from sim_sensor.gel_shape import POWERS, arc_patches, patches_on
+from sim_sensor.signals.gel import GelPad
+from sim_sensor.signals.gel_contact import free_surface, outside
+from sim_sensor.signals.gel_shape import POWERS, arc_patches, patches_on
 
 QUIET = {"correlated": 0.0, "gain": 0.0, "offset": 0.0, "misplaced": 0.0, "misturned": 0.0}
 UPRIGHT = Axis(np.zeros(3), np.array([0.0, 0.0, 1.0]))

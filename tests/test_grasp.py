@@ -16,13 +16,13 @@ from estimator.surface import SurfaceOfRevolution
 from estimator.vectors import frozen
 from hand_models import load_hand
 from hand_models.collision import HandCollision
-from planner.closing import body_of, close_on
-from planner.grasp import GraspOptions, NoGrasp, closes_on, plan_grasp
-from planner.grasp_motion import closed_posture
-from planner.grasp_quality import contact_wrenches, ferrari_canny
+from planner.grasping.closing import body_of, close_on
+from planner.grasping.grasp import GraspOptions, NoGrasp, closes_on, plan_grasp
+from planner.grasping.grasp_motion import closed_posture
+from planner.grasping.grasp_quality import contact_wrenches, ferrari_canny
 from planner.messages import grasp_record
-from planner.solid import RevolvedSolid
-from planner.workspace import Workspace
+from planner.reaching.solid import RevolvedSolid
+from planner.reaching.workspace import Workspace
 from sim_sensor.noise import simulated_sensor
 from sim_sensor.objects import load_object
 from sim_sensor.world import World

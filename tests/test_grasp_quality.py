@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
-from planner.grasp_quality import (
+from planner.grasping.grasp_quality import (
     contact_wrenches,
     ferrari_canny,
     gauge_margin,

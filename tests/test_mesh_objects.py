@@ -18,9 +18,9 @@ from estimator.axis import Axis, angle_between, offset_at
 from estimator.profile import spline_through
 from estimator.surface import SurfaceOfRevolution
 from sim_sensor.mesh_objects import MeshObject, read_mesh
-from sim_sensor.meshes import lathe_mesh
 from sim_sensor.objects import load_object
 from sim_sensor.scanned import Scan, scan_of
+from sim_sensor.viewer.meshes import lathe_mesh
 
 AXIS = Axis([0.1, -0.3, 0.05], [0.4, 0.2, 0.8])
 

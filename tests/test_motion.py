@@ -15,16 +15,16 @@ from estimator.sensors import SENSORS
 from hand_models import load_hand
 from hand_models.collision import HandCollision
 from planner.goal import Goal
+from planner.motions.round_motion import plan_round
+from planner.motions.surroundings import OBJECT, Box, object_body
+from planner.motions.timing import PAUSE, STEP, MotionLimits, timed, travel
+from planner.motions.trajectory import Configuration, between
+from planner.motions.transfer import movable_among, plan_transfer
 from planner.options import PlannerOptions
 from planner.plan import plan_probes
-from planner.reach_task import ReachOptions
-from planner.round_motion import plan_round
-from planner.solid import RevolvedSolid, believed_solid
-from planner.surroundings import OBJECT, Box, object_body
-from planner.timing import PAUSE, STEP, MotionLimits, timed, travel
-from planner.trajectory import Configuration, between
-from planner.transfer import movable_among, plan_transfer
-from planner.workspace import Workspace
+from planner.reaching.reach_task import ReachOptions
+from planner.reaching.solid import RevolvedSolid, believed_solid
+from planner.reaching.workspace import Workspace
 
 AXIS = Axis(np.array([0.5, 0.0, 0.2]), np.array([0.1, -0.1, 1.0]))
 HAND = load_hand("allegro_right")
@@ -240,7 +240,7 @@ def test_a_hand_that_stands_in_something_is_told_so():
 
 
 def test_a_hand_that_is_walled_in_is_told_what_is_in_the_way(monkeypatch):
-    monkeypatch.setattr("planner.transfer.CHECKS", 300)
+    monkeypatch.setattr("planner.motions.transfer.CHECKS", 300)
     cage = Box((0.4, -0.1, 0.4), (0.02, 3.0, 3.0), name="the cage")
     end = Configuration(HAND.middle, pin.SE3(FACING, np.array([0.8, 0.0, 0.35])))
     found = plan_transfer(free_space(cage), HOME, end, wanted=0.03)

@@ -9,18 +9,18 @@ import pytest
 
 from hand_models import load_hand
 from hand_models.collision import HandCollision, LinkPair
-from planner.motion_certificate import MotionCertificate
-from planner.reach_task import ReachOptions
-from planner.solid import RevolvedSolid
-from planner.timing import MotionLimits
-from planner.trajectory import Configuration, Guard
+from planner.motions.motion_certificate import MotionCertificate
+from planner.motions.timing import MotionLimits
+from planner.motions.trajectory import Configuration, Guard
+from planner.motions.transfer import movable_among, plan_transfer
+from planner.reaching.reach_task import ReachOptions
+from planner.reaching.solid import RevolvedSolid
 from planner.trajectory_messages import (
     base_trajectory,
     certificate_record,
     joint_trajectory,
     trajectory_record,
 )
-from planner.transfer import movable_among, plan_transfer
 
 HAND = load_hand("allegro_right")
 

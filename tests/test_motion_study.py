@@ -10,10 +10,10 @@ from raw_meshes import RawMeshes
 from estimator.axis import Axis
 from estimator.surface import SurfaceOfRevolution
 from hand_models import load_hand
+from planner.motions.surroundings import Box
+from planner.motions.timing import MotionLimits, timed
+from planner.motions.trajectory import between
 from planner.options import PlannerOptions
-from planner.surroundings import Box
-from planner.timing import MotionLimits, timed
-from planner.trajectory import between
 from sim_sensor.objects import load_object
 
 HAND = load_hand("allegro_right")

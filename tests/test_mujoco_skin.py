@@ -15,8 +15,8 @@ from mujoco_finger import RADIUS, TORUS, Pressed, model_of, press
 from estimator.local_surface import LocalSurface
 from estimator.readers.raw_sensors import raw_sensor, with_depth
 from estimator.vectors import Array
-from sim_sensor.gel import GelPad
-from sim_sensor.mujoco_skin import PITCH, pixels
+from sim_sensor.physics.mujoco_skin import PITCH, pixels
+from sim_sensor.signals.gel import GelPad
 
 SIDE = pixels(RADIUS) * PITCH
 DEPTH = 1e-3  # of a press [m]

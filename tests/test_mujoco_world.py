@@ -29,11 +29,11 @@ from planner.goal import Goal
 from planner.options import PlannerOptions
 from planner.plan import Plan, Probe, plan_probes
 from sim_sensor.camera import coarse_view
-from sim_sensor.mujoco_hand import add_hand, joint_targets, place_base
-from sim_sensor.mujoco_models import Standing, moving_model
-from sim_sensor.mujoco_press import press
-from sim_sensor.mujoco_world import MujocoWorld
 from sim_sensor.objects import load_object
+from sim_sensor.physics.mujoco_hand import add_hand, joint_targets, place_base
+from sim_sensor.physics.mujoco_models import Standing, moving_model
+from sim_sensor.physics.mujoco_press import press
+from sim_sensor.physics.mujoco_world import MujocoWorld
 from sim_sensor.solid import Part
 
 HAND = load_hand("allegro_right")

@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 from obstacle_file import read_obstacles
 
-from planner.reach_task import ReachOptions
+from planner.reaching.reach_task import ReachOptions
 
 
 def written(tmp_path, text):

@@ -16,12 +16,12 @@ from episodes import TRUE_AXIS, episode_of
 
 from estimator.surface import SurfaceOfRevolution
 from hand_models.hand import Hand, load_hand
-from sim_sensor.episode import Episode
-from sim_sensor.meshes import lathe_mesh
 from sim_sensor.objects import load_object
-from sim_sensor.scene import Scene, build_scene
-from sim_sensor.timeline import captions
-from sim_sensor.view import write_page
+from sim_sensor.viewer.episode import Episode
+from sim_sensor.viewer.meshes import lathe_mesh
+from sim_sensor.viewer.scene import Scene, build_scene
+from sim_sensor.viewer.timeline import captions
+from sim_sensor.viewer.view import write_page
 
 
 @pytest.fixture(scope="module")

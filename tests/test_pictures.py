@@ -14,9 +14,9 @@ from PIL import Image
 
 from estimator.vectors import Array
 from hand_models.hand import load_hand
-from sim_sensor.episode import Episode
-from sim_sensor.pictures import Signal, picture
-from sim_sensor.view import write_page
+from sim_sensor.viewer.episode import Episode
+from sim_sensor.viewer.pictures import Signal, picture
+from sim_sensor.viewer.view import write_page
 
 
 def pixels(values: Array) -> Array:

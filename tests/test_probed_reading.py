@@ -11,9 +11,9 @@ from estimator.readers.response_fit import fit_response
 from estimator.readers.response_models import boussinesq, separable
 from estimator.readers.strain import read_strains
 from estimator.readers.strain_array import StrainArray, taxel_array
-from sim_sensor.probing import Campaign, probe_finger
-from sim_sensor.tactel_imperfections import StrainImperfections
-from sim_sensor.tactels import StrainFinger
+from sim_sensor.signals.probing import Campaign, probe_finger
+from sim_sensor.signals.tactel_imperfections import StrainImperfections
+from sim_sensor.signals.tactels import StrainFinger
 
 COUNT = 200
 ARRAY = StrainArray(tactels=(4, 4))

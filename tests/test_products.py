@@ -17,11 +17,11 @@ from estimator.contact import Contact
 from estimator.profile import SplineProfile
 from estimator.surface import SurfaceOfRevolution
 from estimator.vectors import Array
-from sim_sensor.meshes import lathe_mesh
 from sim_sensor.noise import simulated_sensor
 from sim_sensor.objects import load_object
 from sim_sensor.scanned import Scan, wall_points
 from sim_sensor.solid import Part
+from sim_sensor.viewer.meshes import lathe_mesh
 from sim_sensor.world import World
 
 AXIS = Axis([0.3, -0.2, 0.5], [0.3, -0.2, 0.9])

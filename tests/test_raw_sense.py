@@ -20,7 +20,7 @@ from estimator.surface import Place, SurfaceOfRevolution
 from estimator.vectors import Array, cross
 from sim_sensor.feeling import Felt, Touched
 from sim_sensor.objects import load_object
-from sim_sensor.raw_sense import raw_sense
+from sim_sensor.signals.raw_sense import raw_sense
 from sim_sensor.world import World
 
 AXIS = Axis([0.1, 0.2, 0.3], [0.1, -0.2, 1.0])

@@ -10,16 +10,16 @@ import pinocchio as pin
 import pytest
 from reach_targets import HALF, SHAPES, target
 
-import planner.reach
+import planner.reaching.reach
 from hand_models.collision import HandCollision
 from hand_models.geometry import link_points
 from hand_models.hand import load_hand
 from hand_models.postures import posture_library
-from planner.reach import Reach, ReachOptions, ReachSolver, Unreachable
-from planner.reach_model import ReachModel
-from planner.solid import RevolvedSolid
-from planner.starts import Start
-from planner.workspace import Workspace
+from planner.reaching.reach import Reach, ReachOptions, ReachSolver, Unreachable
+from planner.reaching.reach_model import ReachModel
+from planner.reaching.solid import RevolvedSolid
+from planner.reaching.starts import Start
+from planner.reaching.workspace import Workspace
 
 HAND = load_hand("allegro_right")
 SOLVER = ReachSolver(HAND)
@@ -198,7 +198,7 @@ def test_a_new_object_needs_no_new_problem(monkeypatch):
         written.append((fingers, motion))
         return ReachModel(hand, spheres, fingers, motion=motion)
 
-    monkeypatch.setattr(planner.reach, "ReachModel", counted)
+    monkeypatch.setattr(planner.reaching.reach, "ReachModel", counted)
     solver = ReachSolver(HAND)
     for seed, shape in enumerate(SHAPES):
         points, normals, solid = target(np.random.default_rng(seed), (), shape)

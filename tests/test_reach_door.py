@@ -13,10 +13,10 @@ from hand_models.collision import HandCollision
 from hand_models.hand import HandError, load_hand
 from hand_models.postures import posture_library
 from hand_models.spheres import link_spheres
-from planner.reach import ReachOptions, ReachSolver
-from planner.solid import PARAMETERS, RevolvedSolid, signed_distance
-from planner.starts import StartSearch
-from planner.workspace import Workspace
+from planner.reaching.reach import ReachOptions, ReachSolver
+from planner.reaching.solid import PARAMETERS, RevolvedSolid, signed_distance
+from planner.reaching.starts import StartSearch
+from planner.reaching.workspace import Workspace
 
 HAND = load_hand("allegro_right")
 SOLVER = ReachSolver(HAND)

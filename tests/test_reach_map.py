@@ -11,8 +11,8 @@ from hand_models import load_hand
 from hand_models.cache import CACHE_VARIABLE
 from planner.candidates import placement_candidates
 from planner.hand_tools import hand_tools
-from planner.reach_map import GAP, RATIO, SMALLEST, ReachMap
-from planner.reach_task import ReachOptions
+from planner.reaching.reach_map import GAP, RATIO, SMALLEST, ReachMap
+from planner.reaching.reach_task import ReachOptions
 
 CONE = float(np.deg2rad(40.0))
 HAND = load_hand("allegro_right")

@@ -11,7 +11,7 @@ from benchmark_reach import LEAST_GAP, SPREAD, targets
 from reach_peers import MinkPeer, PinkPeer, ScipyPeer, floating_mjcf, moved
 
 from hand_models import load_hand
-from planner.starts import Start
+from planner.reaching.starts import Start
 
 CONE = float(np.radians(40.0))
 

@@ -12,10 +12,10 @@ from estimator.axis import Axis, angle_between
 from estimator.profile import cylinder
 from estimator.sensors import SENSORS
 from estimator.surface import SurfaceOfRevolution
-from sim_sensor.gel import GelPad
-from sim_sensor.gel_shape import arc_patches
 from sim_sensor.noise import simulated_sensor
-from sim_sensor.tactels import StrainFinger
+from sim_sensor.signals.gel import GelPad
+from sim_sensor.signals.gel_shape import arc_patches
+from sim_sensor.signals.tactels import StrainFinger
 from sim_sensor.world import World
 
 ROOT = Path(__file__).parents[1]

@@ -9,9 +9,9 @@ import pytest
 
 from hand_models import load_hand
 from hand_models.collision import HandCollision
-from planner.certificate import Tolerances, certify, faults
-from planner.reach import Reach, ReachOptions, ReachSolver, Unreachable
-from planner.solid import RevolvedSolid
+from planner.reaching.certificate import Tolerances, certify, faults
+from planner.reaching.reach import Reach, ReachOptions, ReachSolver, Unreachable
+from planner.reaching.solid import RevolvedSolid
 
 HAND = load_hand("allegro_right")
 MIDDLE = np.array([0.5, 0.0, 0.2])

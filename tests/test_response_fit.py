@@ -7,9 +7,9 @@ from estimator.readers.probing import Probe, Probing
 from estimator.readers.response_fit import fit_response
 from estimator.readers.response_models import separable
 from estimator.readers.strain_array import StrainArray
-from sim_sensor.probing import Campaign, probe_finger
-from sim_sensor.tactel_imperfections import StrainImperfections
-from sim_sensor.tactels import StrainFinger
+from sim_sensor.signals.probing import Campaign, probe_finger
+from sim_sensor.signals.tactel_imperfections import StrainImperfections
+from sim_sensor.signals.tactels import StrainFinger
 
 PAIR = [27, 28]  # tactels in the middle of 8 x 8
 WIDE = Probe(1e-3, "flat")

@@ -8,8 +8,8 @@ from estimator.belief import SampledObjects
 from estimator.profile import SplineProfile
 from estimator.surface import SurfaceOfRevolution
 from estimator.vectors import unit
-from planner.prospects import prospects
-from planner.sampled_surfaces import SampledProfiles, SampledSurfaces
+from planner.choosing.prospects import prospects
+from planner.choosing.sampled_surfaces import SampledProfiles, SampledSurfaces
 
 RNG = np.random.default_rng(8)
 B, N = 5, 40

@@ -9,8 +9,8 @@ import pytest
 
 from estimator.readers.strain import read_strains
 from estimator.readers.strain_array import StrainArray
-from sim_sensor.tactel_imperfections import StrainImperfections
-from sim_sensor.tactels import StrainFinger
+from sim_sensor.signals.tactel_imperfections import StrainImperfections
+from sim_sensor.signals.tactels import StrainFinger
 
 COUNT = 400
 R1, K2 = 22e-3, 1.0 / 190e-3

@@ -12,12 +12,12 @@ from hand_models.collision import HandCollision
 from hand_models.postures import posture_library
 from hand_models.spheres import link_spheres
 from planner.candidates import GAP, placement_candidates
-from planner.choice import rank
+from planner.choosing.choice import rank
+from planner.choosing.sweep import FROM, KEPT, joined, swept
+from planner.choosing.worth import Worth
 from planner.goal import Goal
 from planner.hand_tools import hand_tools
-from planner.reach_task import ReachOptions
-from planner.sweep import FROM, KEPT, joined, swept
-from planner.worth import Worth
+from planner.reaching.reach_task import ReachOptions
 
 CONE = float(np.deg2rad(40.0))
 GOAL = Goal(float(np.deg2rad(3.0)), 2e-3)

@@ -6,8 +6,8 @@ import pytest
 from estimator.readers.hertz import contact_ellipse
 from estimator.readers.response_models import separable
 from estimator.readers.strain_array import StrainArray, taxel_array
-from sim_sensor.tactel_imperfections import ORDINARY, StrainImperfections
-from sim_sensor.tactels import StrainFinger
+from sim_sensor.signals.tactel_imperfections import ORDINARY, StrainImperfections
+from sim_sensor.signals.tactels import StrainFinger
 
 CENTRE = [[0.0, 0.0]]
 SMALL = StrainArray(tactels=(4, 4))

@@ -1,0 +1,117 @@
+"""Where planned touches would land if the object were a little other than believed.
+
+A plan is made for the believed object and carried out on the true one. Every candidate is
+therefore followed along its approach to many objects drawn from the belief.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimator.belief import SampledObjects
+from estimator.singular import PlacedTriples
+from estimator.surface import Geometry
+from estimator.vectors import Array, Mask
+from planner.choosing.sampled_surfaces import SampledSurfaces
+
+BEFORE, BEHIND = 0.030, 0.025  # how far an approach goes, about the expected contact [m]
+STEPS = 6
+RIM = 0.02  # of the height at each end where a touch does not count as one of the wall
+
+
+@dataclass(frozen=True, eq=False)
+class Prospects:
+    """Touches of N candidates with m fingers on B sampled objects, arrays (B, N, m).
+
+    Args:
+        geometry: Exact surface geometry where each approach meets the object, (B, N * m).
+        theta, z, r, dr, ddr: Places and profiles there.
+        hit: Whether the approach meets the wall within its stroke.
+    """
+
+    geometry: Geometry
+    theta: Array
+    z: Array
+    r: Array
+    dr: Array
+    ddr: Array
+    hit: Mask
+    points: Array
+    directions: Array
+
+    @property
+    def triples(self) -> PlacedTriples:
+        return PlacedTriples(self.theta, self.z, self.r, self.dr, self.ddr)
+
+
+def prospects(samples: SampledObjects, p_W: Array, n_W: Array) -> Prospects:
+    """Follow approaches along -n to each sampled object.
+
+    Args:
+        p_W, n_W: Expected contacts and outward normals, (N, m, 3) [m], unit.
+    """
+    B, (N, m) = len(samples.points), p_W.shape[:2]
+    p = np.broadcast_to(p_W.reshape(1, -1, 3), (B, N * m, 3))
+    n = np.broadcast_to(n_W.reshape(1, -1, 3), (B, N * m, 3))
+    surfaces = SampledSurfaces(samples)
+    s, theta, off_wall, z = _met(surfaces, p, n)
+    low, high = surfaces.profiles.z_range
+    inset = RIM * (high - low)
+    inside = np.clip(z, low, high)
+    hit = (np.abs(off_wall) < 5e-4) & (s > -BEFORE) & (s < BEHIND)
+    hit &= (z > low + inset) & (z < high - inset)
+    places = (theta, inside, *surfaces.profiles.derivatives(inside))
+    theta, inside, r, dr, ddr = (x.reshape(B, N, m) for x in places)
+    return Prospects(
+        surfaces.at(*places[:2]), theta, inside, r, dr, ddr, hit.reshape(B, N, m),
+        samples.points, samples.directions,
+    )  # fmt: skip
+
+
+def _met(surfaces: SampledSurfaces, p: Array, n: Array) -> tuple[Array, Array, Array, Array]:
+    """Where lines p - s n (B, M) meet the walls: s, meridian angle, what is left, height.
+
+    Newton's steps along the line; on a wall that leans away they are kept short.
+    """
+    low, high = surfaces.profiles.z_range
+    across = n @ np.swapaxes(surfaces.frames, 1, 2)
+    s = np.zeros(p.shape[:2])
+    for _ in range(STEPS):
+        theta, rho, z = surfaces.cylindrical(p - s[..., None] * n)
+        r, dr, _ = surfaces.profiles.derivatives(np.clip(z, low, high))
+        outward = across[..., 0] * np.cos(theta) + across[..., 1] * np.sin(theta)
+        slope = -outward + dr * across[..., 2]
+        s = np.clip(s - (rho - r) / np.minimum(slope, -0.2), -1.5 * BEFORE, 1.5 * BEHIND)
+    theta, rho, z = surfaces.cylindrical(p - s[..., None] * n)
+    return s, theta, rho - surfaces.profiles.derivatives(np.clip(z, low, high))[0], z
+
+
+def with_earlier(landed: Prospects, samples: SampledObjects, p_W: Array) -> PlacedTriples | None:
+    """Triples of earlier contacts and candidates together, where that makes three, (B, N, 3).
+
+    Args:
+        p_W: Positions of the earlier contacts, (k, 3) [m].
+    Returns:
+        None unless k earlier contacts and the m new ones are three.
+    """
+    _, N, m = landed.theta.shape
+    k = len(p_W)
+    if k + m != 3:
+        return None
+    if k == 0:
+        return landed.triples
+    known = _known_places(SampledSurfaces(samples), p_W)
+    columns = [
+        np.concatenate([np.repeat(old[:, None], N, axis=1), new], axis=-1)
+        for old, new in zip(known, landed.triples, strict=True)
+    ]
+    return PlacedTriples(*columns)
+
+
+def _known_places(surfaces: SampledSurfaces, p_W: Array) -> PlacedTriples:
+    """Places of contacts (k, 3) on each object, (B, k)."""
+    theta, _, z = surfaces.cylindrical(p_W[None])
+    z = np.clip(z, *surfaces.profiles.z_range)
+    return PlacedTriples(theta, z, *surfaces.profiles.derivatives(z))

@@ -1,0 +1,82 @@
+"""By what touches are valued: what the axis would be known to after them, over the belief."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from estimator.belief import Belief, SampledObjects
+from estimator.contact import SensorNoise
+from estimator.information import contact_information, known_before
+from estimator.singular import margins
+from estimator.triple_scores import in_goals
+from estimator.vectors import Array
+from planner.choosing.prospects import Prospects, with_earlier
+from planner.goal import Goal
+
+DOUBTFUL_OBJECTS = 0.25  # share of the objects that may come nearer to a singularity
+
+
+@dataclass(frozen=True, eq=False)
+class Worth:
+    """The belief, objects drawn from it, the sensor and the goal.
+
+    Args:
+        noise: Of the sensor, with the common rotation that the expected error reckons with.
+        height: Of the place along the believed axis where the offset counts, the later grasp's
+            [m], from the axis' point.
+    """
+
+    belief: Belief
+    samples: SampledObjects
+    noise: SensorNoise
+    goal: Goal
+    height: float = 0.0
+
+    @property
+    def before(self) -> Array:
+        """What is known already, in goals, (5, 5)."""
+        return self._scaled(known_before(self.belief.covariance, self.noise.direction_offset))
+
+    def information(self, landed: Prospects) -> Array:
+        """Of each touch on each object, zero where it misses, in goals, (B, N, m, 5, 5)."""
+        B, N, m = landed.theta.shape
+        each = contact_information(landed.geometry, landed.points, landed.directions, self.noise)
+        return self._scaled(each.reshape(B, N, m, 5, 5) * landed.hit[..., None, None])
+
+    def covariances(self, landed: Prospects) -> Array:
+        """After the touches of each candidate on each object, in goals, (B, N, 4, 4)."""
+        total = self.before + self.information(landed).sum(axis=2)
+        return np.asarray(np.linalg.inv(total)[..., :4, :4])
+
+    def least_margins(self, landed: Prospects) -> Array:
+        """Margin that three of four objects keep from each singularity, (N, K)."""
+        return doubtful_margins(self.margins(landed))
+
+    def margins(self, landed: Prospects) -> Array:
+        """From each singularity on each object, (B, N, K).
+
+        Of the triple that the touches make together with the contacts there already are; where
+        more or fewer than three are in all, no triple has to be good: infinite, (B, N, 1).
+        """
+        earlier = np.array([c.position for c in self.belief.contacts]).reshape(-1, 3)
+        triples = with_earlier(landed, self.samples, earlier)
+        if triples is None:
+            return np.full((*landed.theta.shape[:2], 1), np.inf)
+        return margins(triples).values
+
+    def _scaled(self, information: Array) -> Array:
+        goal = self.goal
+        return in_goals(information, angle=goal.angle, offset=goal.offset, height=self.height)
+
+
+def doubtful_margins(margins: Array) -> Array:
+    """Margins (B, N, K) that three of four objects keep, (N, K)."""
+    quantile = np.quantile(margins, DOUBTFUL_OBJECTS, axis=0, method="lower")  # infinite ones stay
+    return np.asarray(quantile)
+
+
+def guarded(noise: SensorNoise, offset: float) -> SensorNoise:
+    """The sensor with a common rotation of the directions beside what it admits [rad]."""
+    return replace(noise, direction_offset=float(np.hypot(noise.direction_offset, offset)))

@@ -1,0 +1,1 @@
+"""A grasp about the axis that holds whatever the belief still allows."""

@@ -1,0 +1,123 @@
+"""Hold a solution of the optimiser against the rules of its task: certificates and faults."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import coal
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from hand_models.collision import HandCollision, LinkPair
+from hand_models.hand import Hand
+from planner.reaching.certificate import Certificate, Tolerances, certify, faults, gap_in_words
+from planner.reaching.reach_task import ReachOptions, ReachTask, Solution
+
+Array = NDArray[np.float64]
+
+_RETREATED = (0.33, 0.67, 1.0)  # shares of an arm's retreat that are checked
+_PRESSED = (0.0, 0.25, 0.5, 0.75, 1.0)  # shares of a finger's overshoot that are checked
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """What was found.
+
+    Attributes:
+        at: Certificate of the contact.
+        before: Of the stand-off; `at` itself if nothing moves.
+        faults: What is wrong, in words, the gravest first; none for a good solution.
+    """
+
+    at: Certificate
+    before: Certificate
+    faults: tuple[str, ...]
+
+
+def inspect(hand: Hand, collision: HandCollision, task: ReachTask, found: Solution) -> Inspection:
+    """Check contact, stand-off, the arm's way between them, and the fingers' overshoot."""
+    options, fingers = task.options, found.fingers
+    allowed = _tolerances(options)
+    at = _certificate(hand, collision, task, found, 0.0)
+    before, said = at, list(faults(hand, at, found.q, fingers, allowed))
+    wide = replace(allowed, cone=max(options.cone, options.off_contact_cone))
+    by_arm = bool(np.any(found.retreat))
+    shares = _RETREATED if by_arm else (1.0,) if np.any(found.standoff) else ()
+    for share in shares:
+        before = _certificate(hand, collision, task, found, share)
+        wrong = faults(hand, before, found.q_standoff, fingers, wide)
+        said.extend(f"at stand-off: {fault}" for fault in wrong)
+    for share in (0.0, *shares):
+        said.extend(_table_faults(hand, collision, options, found, share))
+    if not by_arm and np.any(found.overshoot):
+        said.extend(_pressing_faults(hand, collision, options, found))
+    return Inspection(at, before, tuple(said))
+
+
+def _tolerances(options: ReachOptions) -> Tolerances:
+    return Tolerances(
+        position=options.position_tolerance,
+        cone=options.cone,
+        self_clearance=options.self_clearance,
+        object_clearance=options.clearance,
+        pad_depth=options.pad_depth,
+    )
+
+
+def _certificate(
+    hand: Hand, collision: HandCollision, task: ReachTask, found: Solution, share: float
+) -> Certificate:
+    """Of the contact (share 0), or of a share of the way to the stand-off."""
+    by_arm = np.any(found.retreat)
+    away = found.retreat if by_arm else found.standoff[:, None] * task.normals
+    return certify(
+        hand,
+        collision,
+        *_posture(found, share),
+        task.solid,
+        fingers=found.fingers,
+        points=task.points + share * away,
+        normals=task.normals,
+    )
+
+
+def _posture(found: Solution, share: float) -> tuple[Array, pin.SE3]:
+    """Joints and base at the contact (share 0), or at a share of the way to the stand-off."""
+    X_WB = pin.SE3(found.X_WB.rotation, found.X_WB.translation + share * found.retreat)
+    return (found.q if share == 0.0 else found.q_standoff), X_WB
+
+
+def _table_faults(
+    hand: Hand, collision: HandCollision, options: ReachOptions, found: Solution, share: float
+) -> Iterator[str]:
+    if options.table is None:
+        return
+    *normal, height = options.table
+    below = coal.Halfspace(np.array(normal), height)
+    near = collision.object_clearance(*_posture(found, share), [below], pin.SE3.Identity())
+    link, distance = near.nearest()
+    if distance < options.clearance:
+        yield gap_in_words(LinkPair(link, "the table", distance))
+    for finger, pad in zip(hand.fingers, near.pads, strict=True):
+        if pad < 0.0:
+            yield gap_in_words(LinkPair(f"the pad of {finger.name}", "the table", float(pad)))
+
+
+def _pressing_faults(
+    hand: Hand, collision: HandCollision, options: ReachOptions, found: Solution
+) -> Iterator[str]:
+    """One finger presses on behind its contact while the others wait at their stand-offs.
+
+    The object is no obstacle then: were it where it is believed, the finger had stopped.
+    """
+    for name in found.fingers:
+        joints = hand.finger(name).q_indices
+        for share in _PRESSED:
+            q = found.q_standoff.copy()
+            q[joints] = (1.0 - share) * found.q[joints] + share * found.q_overshoot[joints]
+            pair = collision.self_clearance(q)
+            if pair.distance < options.self_clearance:
+                yield f"{name} beyond its contact: {gap_in_words(pair)}"
+                break

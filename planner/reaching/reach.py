@@ -1,0 +1,213 @@
+"""Put the hand's pads on given contacts: joint angles and a base pose, certified, or a reason.
+
+Starts (the caller's, then the library's) go through a fast SQP one by one; the first whose solution
+passes the independent check is returned. If none does, the most promising of those that stopped
+short go through Ipopt.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hand_models.collision import HandCollision
+from hand_models.hand import Hand
+from hand_models.spheres import link_spheres
+from planner.reaching.diagnosis import cone_fault
+from planner.reaching.inspection import inspect
+from planner.reaching.reach_kinematics import LENGTH
+from planner.reaching.reach_model import Motion, ReachModel
+from planner.reaching.reach_outcome import Reach, Unreachable
+from planner.reaching.reach_task import ReachOptions, ReachTask, Solution, solve_task
+from planner.reaching.solid import RevolvedSolid
+from planner.reaching.starts import Start, StartSearch
+
+__all__ = ["Reach", "ReachOptions", "ReachSolver", "Unreachable"]
+
+Array = NDArray[np.float64]
+
+_UNIT_TOLERANCE = 1e-6
+_HOPELESS = 4e-3  # violation beyond which no certificate is needed: 0.2 mm
+
+
+class ReachSolver:
+    """Reaches for one hand. Problems are written down once per set of fingers and kept.
+
+    Args:
+        hand: The hand.
+        options: Rules and effort.
+    """
+
+    def __init__(self, hand: Hand, options: ReachOptions | None = None) -> None:
+        self.hand = hand
+        self.options = ReachOptions() if options is None else options
+        self._spheres = link_spheres(hand)
+        self._collision = HandCollision(hand)
+        self._models: dict[tuple[tuple[int, ...], Motion], ReachModel] = {}
+
+    @cached_property
+    def _search(self) -> StartSearch:
+        return StartSearch(self.hand, self._spheres)
+
+    def solve(
+        self,
+        points: ArrayLike,
+        normals: ArrayLike,
+        solid: RevolvedSolid,
+        *,
+        fingers: Sequence[str] | None = None,
+        starts: Sequence[Start] = (),
+        motion: Motion = "fingers",
+    ) -> Reach | Unreachable:
+        """Find a hand pose that makes the contacts.
+
+        Args:
+            points: (k, 3) surface points, one for each finger at most, in the world [m].
+            normals: (k, 3) outward unit normals there.
+            solid: The believed object; links stay out of it.
+            fingers: The finger of each contact; None tries all assignments.
+            starts: Guesses to try before those of the library.
+            motion: "fingers": they alone reach stand-off and overshoot, the base held; "arm": it
+                retreats the hand along the mean normal, the way kept clear; "none": contact only.
+
+        Raises:
+            ValueError: Shapes, lengths of normals, or a finger used twice.
+            HandError: A finger the hand has not.
+        """
+        contacts = _contacts(points, normals, most=len(self.hand.fingers))
+        task = ReachTask(*contacts, solid, self.options)
+        named = None if fingers is None else self._checked_fingers(fingers, len(task.points))
+        failed: list[Solution] = []
+        used: list[Start] = []
+        for start in self._starts(task, named, starts):
+            outcome = self._attempt(task, start, "sqp", motion, len(failed) + 1)
+            if isinstance(outcome, Reach):
+                return outcome
+            failed.append(outcome)
+            used.append(start)
+        for i in _to_rescue(failed)[: self.options.rescues]:
+            outcome = self._attempt(task, used[i], "ipopt", motion, len(failed) + 1)
+            if isinstance(outcome, Reach):
+                return outcome
+            failed.append(outcome)
+        return self._unreachable(task, failed)
+
+    def _starts(
+        self, task: ReachTask, fingers: tuple[str, ...] | None, given: Sequence[Start]
+    ) -> Iterator[Start]:
+        """The caller's starts, then those of the library, which are only looked up if needed."""
+        for start in given:
+            if fingers is None or start.fingers == fingers:
+                yield start
+        if self.options.starts == 0:
+            return
+        names = None if fingers is None else tuple(self._index(name) for name in fingers)
+        radius = self.hand.fingers[0].pad_radius if names is None else self._radii(names)
+        yield from self._search.find(
+            task.points + np.reshape(radius, (-1, 1)) * task.normals,
+            task.normals,
+            task.solid,
+            fingers=names,
+            workspace=self.options.workspace,
+            table=self.options.table,
+            count=self.options.starts,
+        )
+
+    def _attempt(
+        self, task: ReachTask, start: Start, solver: str, motion: Motion, tried: int
+    ) -> Reach | Solution:
+        """One start through one solver; a solution that is not good enough comes back as it is.
+
+        The contact alone comes first: ten times cheaper, it settles most starts that lead nowhere.
+        """
+        fingers = tuple(sorted(self._index(name) for name in start.fingers))
+        solution = solve_task(self._model(fingers, "none"), task, start, solver=solver)
+        if solution.violation < _HOPELESS and self._collision.is_self_free(solution.q):
+            contact = Start(start.fingers, solution.q, solution.X_WB)
+            solution = solve_task(self._model(fingers, motion), task, contact, solver=solver)
+        if not solution.violation < _HOPELESS:
+            return solution
+        found = inspect(self.hand, self._collision, task, solution)
+        if found.faults:
+            return solution
+        return Reach(
+            fingers=solution.fingers,
+            q=_frozen(solution.q),
+            q_standoff=_frozen(solution.q_standoff),
+            q_overshoot=_frozen(solution.q_overshoot),
+            X_WB=solution.X_WB,
+            retreat=_frozen(solution.retreat),
+            standoff=_frozen(solution.standoff),
+            overshoot=_frozen(solution.overshoot),
+            points=task.points,
+            normals=task.normals,
+            certificate=found.at,
+            before=found.before,
+            solver=solver,
+            tried=tried,
+        )
+
+    def _unreachable(self, task: ReachTask, failed: list[Solution]) -> Unreachable:
+        if not failed:
+            return Unreachable("no start was given and none was to be looked up", (), (), 0)
+        nearest = min(failed, key=lambda solution: solution.violation)
+        found = inspect(self.hand, self._collision, task, nearest).faults
+        if not nearest.violation < _HOPELESS:
+            model = self._model(tuple(sorted(map(self._index, nearest.fingers))), "none")
+            turned = cone_fault(self.hand, self._collision, model, task, nearest)
+            found = found if turned is None else (turned, *found)
+        short = f"the optimiser stopped {1e3 * LENGTH * nearest.violation:.2f} mm short"
+        return Unreachable(found[0] if found else short, found, nearest.fingers, len(failed))
+
+    def _model(self, fingers: tuple[int, ...], motion: Motion) -> ReachModel:
+        key = (fingers, motion)
+        if key not in self._models:
+            self._models[key] = ReachModel(self.hand, self._spheres, fingers, motion=motion)
+        return self._models[key]
+
+    def _checked_fingers(self, fingers: Sequence[str], contacts: int) -> tuple[str, ...]:
+        for name in fingers:
+            self.hand.finger(name)
+        if len(fingers) != contacts or len(set(fingers)) != contacts:
+            raise ValueError(
+                f"fingers must name {contacts} different fingers, one per contact, got {fingers}"
+            )
+        return tuple(fingers)
+
+    def _index(self, name: str) -> int:
+        return self.hand.fingers.index(self.hand.finger(name))
+
+    def _radii(self, fingers: tuple[int, ...]) -> Array:
+        return np.array([self.hand.fingers[i].pad_radius for i in fingers])
+
+
+def _to_rescue(failed: list[Solution]) -> list[int]:
+    """Those that stopped short, the nearest first.
+
+    What solved the problem and failed the inspection, as links collide with each other, would
+    fail it again: the problem does not know of that.
+    """
+    short = [i for i, solution in enumerate(failed) if not solution.violation < _HOPELESS]
+    return sorted(short, key=lambda i: failed[i].violation)
+
+
+def _contacts(points: ArrayLike, normals: ArrayLike, *, most: int) -> tuple[Array, Array]:
+    p, n = _frozen(points), _frozen(normals)
+    if p.ndim != 2 or p.shape != n.shape or p.shape[1] != 3 or not 1 <= len(p) <= most:
+        raise ValueError(
+            f"points and normals must be (k, 3), k 1 to {most}, got {p.shape}, {n.shape}"
+        )
+    if not np.isfinite(p).all():
+        raise ValueError("points must be finite")
+    if not np.all(np.abs(np.linalg.norm(n, axis=1) - 1.0) < _UNIT_TOLERANCE):
+        raise ValueError("normals must be unit vectors")
+    return p, n
+
+
+def _frozen(values: ArrayLike) -> Array:
+    array = np.array(values, dtype=np.float64)
+    array.setflags(write=False)
+    return array

@@ -1,0 +1,1 @@
+"""The same world in MuJoCo: a second opinion that nobody here wrote."""

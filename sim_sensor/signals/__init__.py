@@ -1,0 +1,1 @@
+"""Raw signals of tactile fingers: strains, depth images, and what spoils them."""
