@@ -91,12 +91,13 @@ def plan_round(
 
 
 def _ways(movable: Movable, ways: Sequence[Retreat]) -> list[Retreat]:
-    """Those that lead away; a base that is fixed stays, and joints alone lead to the next place."""
-    if movable.workspace.is_fixed:
-        first = ways[0]
-        still = replace(first, path=first.path[:1], bases=first.bases[:1], clearance=first.nearest)
-        return [still]
-    return [way for way in ways if way.clearance >= min(way.wanted, OUTSIDE)]
+    """Those that lead away; where the base stays, joints may also go on from where they are."""
+    away = [way for way in ways if way.clearance >= min(way.wanted, OUTSIDE)]
+    if not movable.base_stays:
+        return away
+    first = ways[0]
+    still = replace(first, path=first.path[:1], bases=first.bases[:1], clearance=first.nearest)
+    return [*(away if movable.hand.arm is not None else []), still]
 
 
 def probe_motion(
