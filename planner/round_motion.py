@@ -91,9 +91,14 @@ def plan_round(
 
 
 def _ways(movable: Movable, ways: Sequence[Retreat]) -> list[Retreat]:
-    """Those that lead away; a base that is fixed stays, and joints alone lead to the next place."""
-    if movable.workspace.is_fixed:
-        return [replace(ways[0], bases=ways[0].bases[:1], clearance=ways[0].nearest)]
+    """Those that lead away; a base that is fixed stays, and joints alone lead to the next place.
+
+    An arm leads away by its joints.
+    """
+    if movable.workspace.is_fixed and movable.hand.arm is None:
+        first = ways[0]
+        stay = replace(first, path=first.path[:1], bases=first.bases[:1], clearance=first.nearest)
+        return [stay]
     return [way for way in ways if way.clearance >= min(way.wanted, OUTSIDE)]
 
 
