@@ -1,7 +1,14 @@
-"""A way round by sampling: RRT-Connect over joints and base, from OMPL."""
+"""A way round by sampling: RRT-Connect over base and joints, from OMPL.
+
+First only the base looks for a way, six dimensions, while the joints keep to the straight line from
+where they are to where they are wanted, at a pace of their own; if that line is not free, or leads
+nowhere, the joints look as well. Where the base is fixed, or the root of an arm, only joints do.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +26,26 @@ _JOINT_WEIGHT = 0.05  # of a joint's angle beside the base's way [m/rad]
 _ARM_WEIGHT = 0.3  # the same for the joints of arm and hand [m/rad]
 _TURN_WEIGHT = 0.1  # of the base's turn [m/rad]
 _REDUCE = (30, 15, 1.0)  # attempts to leave corners out, in vain in a row, share of the path
-_SHORTEN = (40, 20, 1.0)  # likewise, between any two places
+_SHORTEN = (30, 15, 1.0)  # likewise, between any two places
+_ON_LINE = 9  # places at which the joints' straight line has to be free
+
+
+@dataclass(frozen=True, eq=False)
+class _Joints:
+    """What is sampled for the joints: themselves, or their share of a straight line.
+
+    Args:
+        low, high: Bounds.
+        ends: At begin and end.
+        weight: Of its distances [m].
+        posture: Joint positions of it.
+    """
+
+    low: Array
+    high: Array
+    ends: tuple[Array, Array]
+    weight: float
+    posture: Callable[[Array], Array]
 
 
 def sampled_path(
@@ -33,48 +59,74 @@ def sampled_path(
         margin: Least distance of the hand from the believed object [m].
         checks: How many configurations may be checked.
     """
+    weight = _JOINT_WEIGHT if movable.hand.arm is None else _ARM_WEIGHT
+    every = _Joints(movable.hand.lower, movable.hand.upper, (begin.q, end.q), weight, lambda q: q)
+    along = end.q - begin.q
+    line = _Joints(
+        np.zeros(1), np.ones(1), (np.zeros(1), np.ones(1)),
+        max(_JOINT_WEIGHT * float(np.linalg.norm(along)), 1e-3), lambda u: begin.q + u * along,
+    )  # fmt: skip
+    on_line = (line.posture(np.array([u])) for u in np.linspace(0.0, 1.0, _ON_LINE))
+    is_self_free = movable.around.collision.is_self_free
+    if not movable.base_stays and all(is_self_free(q) for q in on_line):
+        found = _search(movable, (begin, end), line, margin, checks // 2)
+        if found is not None:
+            return found
+    return _search(movable, (begin, end), every, margin, checks)
+
+
+def _search(
+    movable: Movable,
+    ends: tuple[Configuration, Configuration],
+    joints: _Joints,
+    margin: float,
+    checks: int,
+) -> list[Configuration] | None:
     util.setLogLevel(util.LogLevel.LOG_NONE)
     util.RNG.setSeed(1 + movable.seed)
-    space, dof = _space(movable, begin, end), movable.hand.model.nq
-    held = None if movable.hand.arm is None else begin.X_WB  # an arm's root stands still
-    count = 0
+    held = ends[0].X_WB if movable.base_stays else None
+    space, count = _space(ends, joints, held), 0
+
+    def place(state: Any) -> Configuration:
+        vector = state[0] if held is not None else state[2]
+        q = joints.posture(np.array([vector[i] for i in range(len(joints.low))]))
+        return Configuration(q, _pose(state) if held is None else held)
 
     def is_valid(state: Any) -> bool:
         nonlocal count
         count += 1
-        place = _configuration(state, dof, held)
-        R, p = place.X_WB.rotation[None], place.X_WB.translation[None]
-        if not movable.workspace.allows(R, p)[0]:
+        at = place(state)
+        if not movable.workspace.allows(at.X_WB.rotation[None], at.X_WB.translation[None])[0]:
             return False
-        return movable.around.is_free(place.q, place.X_WB, margin)
+        return movable.around.is_free(at.q, at.X_WB, margin)
 
     setup = geometric.SimpleSetup(space)
     setup.setStateValidityChecker(is_valid)
-    setup.setStartAndGoalStates(_state(space, begin), _state(space, end))
+    states = [_state(space, X, v, held) for X, v in zip(ends, joints.ends, strict=True)]
+    setup.setStartAndGoalStates(*states)
     info = setup.getSpaceInformation()
     setup.setPlanner(geometric.RRTConnect(info))
-    spent = base.PlannerTerminationCondition(lambda: count >= checks)
-    setup.solve(spent)
+    setup.solve(base.PlannerTerminationCondition(lambda: count >= checks))
     if not setup.haveExactSolutionPath():
         return None
-    path = setup.getSolutionPath()
-    shorten = geometric.PathSimplifier(info)
+    path, shorten = setup.getSolutionPath(), geometric.PathSimplifier(info)
     shorten.reduceVertices(path, *_REDUCE)
     shorten.partialShortcutPath(path, *_SHORTEN)
-    return [_configuration(path.getState(i), dof, held) for i in range(path.getStateCount())]
+    return [place(path.getState(i)) for i in range(path.getStateCount())]
 
 
-def _space(movable: Movable, begin: Configuration, end: Configuration) -> Any:
-    """Joints within limits and base poses about begin and end, measured in metres."""
-    ends = np.array([begin.X_WB.translation, end.X_WB.translation])
-    place = base.RealVectorStateSpace(3)
-    place.setBounds(_bounds(ends.min(axis=0) - ROOM, ends.max(axis=0) + ROOM))
-    joints = base.RealVectorStateSpace(movable.hand.model.nq)
-    joints.setBounds(_bounds(movable.hand.lower, movable.hand.upper))
+def _space(ends: tuple[Configuration, Configuration], joints: _Joints, held: pin.SE3 | None) -> Any:
+    """Base poses about both ends, and what is sampled of the joints, measured in metres."""
     space = base.CompoundStateSpace()
-    space.addSubspace(place, 1.0)
-    space.addSubspace(base.SO3StateSpace(), 2.0 * _TURN_WEIGHT)  # its distance is half the turn
-    space.addSubspace(joints, _JOINT_WEIGHT if movable.hand.arm is None else _ARM_WEIGHT)
+    if held is None:
+        places = np.array([end.X_WB.translation for end in ends])
+        position = base.RealVectorStateSpace(3)
+        position.setBounds(_bounds(places.min(axis=0) - ROOM, places.max(axis=0) + ROOM))
+        space.addSubspace(position, 1.0)
+        space.addSubspace(base.SO3StateSpace(), 2.0 * _TURN_WEIGHT)  # its distance is half a turn
+    vector = base.RealVectorStateSpace(len(joints.low))
+    vector.setBounds(_bounds(joints.low, joints.high))
+    space.addSubspace(vector, joints.weight)
     space.setLongestValidSegmentFraction(_RESOLUTION / space.getMaximumExtent())
     space.setup()
     return space
@@ -88,17 +140,15 @@ def _bounds(low: Array, high: Array) -> Any:
     return bounds
 
 
-def _state(space: Any, place: Configuration) -> Any:
+def _state(space: Any, end: Configuration, vector: Array, held: pin.SE3 | None) -> Any:
     state = space.allocState()
-    turn = pin.Quaternion(place.X_WB.rotation).coeffs()
-    space.copyFromReals(state, [*place.X_WB.translation, *turn, *place.q])
+    turn = pin.Quaternion(end.X_WB.rotation).coeffs()
+    pose = [*end.X_WB.translation, *turn] if held is None else []
+    space.copyFromReals(state, [*pose, *vector])
     return state
 
 
-def _configuration(state: Any, dof: int, held: pin.SE3 | None) -> Configuration:
-    p, turn, q = state[0], state[1], state[2]
-    joints = np.array([q[i] for i in range(dof)])
-    if held is not None:
-        return Configuration(joints, held)
+def _pose(state: Any) -> pin.SE3:
+    p, turn = state[0], state[1]
     R = pin.Quaternion(turn.w, turn.x, turn.y, turn.z).matrix()
-    return Configuration(joints, pin.SE3(R, np.array([p[0], p[1], p[2]])))
+    return pin.SE3(R, np.array([p[0], p[1], p[2]]))

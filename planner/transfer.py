@@ -49,6 +49,11 @@ class Movable:
     workspace: Workspace
     seed: int = 0
 
+    @property
+    def base_stays(self) -> bool:
+        """Whether only joints move: those of an arm, or of a hand whose base is fixed."""
+        return self.hand.arm is not None or self.workspace.is_fixed
+
     def certify(self, trajectory: Trajectory, margin: float = 0.0) -> MotionCertificate:
         """Measure a trajectory by the rules."""
         return certify_motion(

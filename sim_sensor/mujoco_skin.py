@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 
 from estimator.vectors import Array, basis_across, frozen, unit
 
-PITCH, PIXELS = 0.25e-3, 48  # of the image [m]
+PITCH = 0.25e-3  # of the image's pixels [m]
+_WIDEST, _OF_RADIUS = 12e-3, 1.2  # side of the image [m], and over the pad's radius at most
 _TAXELS = 1500  # all over a sphere, for the aim
 
 
@@ -30,13 +31,18 @@ class SkinImage:
     """What a pad feels.
 
     Args:
-        depth: Of the body below the undeformed dome, along z of S [m], (PIXELS, PIXELS).
+        depth: Of the body below the undeformed dome, along z of S [m], square.
         X_GS: Where the image's frame S sits on the pad's geom G, (4, 4): its origin on the dome,
             z out of the pad through the middle of the contact, x as asked for.
     """
 
     depth: Array
     X_GS: Array
+
+
+def pixels(radius: float) -> int:
+    """Along a side of the image of a pad."""
+    return 2 * int(0.5 * min(_WIDEST, _OF_RADIUS * radius) / PITCH + 1e-9)
 
 
 def add_skin(spec: mujoco.MjSpec, geom: str, radius: float) -> None:
@@ -83,7 +89,8 @@ def feel(model: mujoco.MjModel, data: mujoco.MjData, geom: str, along_W: Array) 
     _turn_geom(model, pad.id, data.xmat[pad.bodyid[0]].reshape(3, 3).T @ R_WS)
     mujoco.mj_forward(model, data)
     radius = float(pad.size[0])
-    normal = _depths(model, data, f"{geom}/grid").reshape(PIXELS, PIXELS)
+    side = pixels(radius)
+    normal = _depths(model, data, f"{geom}/grid").reshape(side, side)
     X_GS = np.eye(4)
     X_GS[2, 3] = radius
     return SkinImage(frozen(_along_z(normal, radius)), frozen(X_GS))
@@ -97,7 +104,7 @@ def _depths(model: mujoco.MjModel, data: mujoco.MjData, sensor: str) -> Array:
 
 def _along_z(depth: Array, radius: float) -> Array:
     """Depths along the body's normals as depths along z."""
-    x, y, z = np.moveaxis(_grid(radius).reshape(PIXELS, PIXELS, 3), -1, 0)
+    x, y, z = np.moveaxis(_grid(radius).reshape(*depth.shape, 3), -1, 0)
     b, a = np.gradient(-depth, PITCH)
     s, t = x / z, y / z  # the dome falls by these along x and y
     # (a + s g)^2 + (b + t g)^2 + g^2 = 1 for g = phi_z < 0
@@ -112,8 +119,9 @@ def _turn_geom(model: mujoco.MjModel, geom: int, R: Array) -> None:
 
 
 def _grid(radius: float) -> Array:
-    """Vertices under the pixels of the image, row by row, (PIXELS^2, 3)."""
-    c = (np.arange(PIXELS) - 0.5 * (PIXELS - 1)) * PITCH
+    """Vertices under the pixels of the image, row by row, (side^2, 3)."""
+    side = pixels(radius)
+    c = (np.arange(side) - 0.5 * (side - 1)) * PITCH
     x, y = np.meshgrid(c, c)
     return np.stack([x, y, np.sqrt(radius**2 - x**2 - y**2)], axis=-1).reshape(-1, 3)
 

@@ -30,7 +30,7 @@ from sim_sensor.mujoco_hand import pad_name, place_base
 from sim_sensor.mujoco_models import OBJECT, Models, Standing, build_models
 from sim_sensor.mujoco_object import place_object
 from sim_sensor.mujoco_press import Press, Touching, press
-from sim_sensor.mujoco_skin import PITCH, PIXELS, feel
+from sim_sensor.mujoco_skin import PITCH, feel, pixels
 from sim_sensor.raw_sense import read_signal
 from sim_sensor.scanned import Scan, felt_at
 from sim_sensor.solid import Solid
@@ -182,7 +182,8 @@ class MujocoWorld:
 def _mounted(radius: float, noisy: bool, rng: np.random.Generator) -> tuple[RawSensor, GelSession]:
     """What the reader is told of a pad, and the pad as it is."""
     sensor = with_depth(raw_sensor(SENSOR), pixel_pitch=PITCH, radius=radius)
-    pad = GelPad(pitch=PITCH, size=(PIXELS * PITCH, PIXELS * PITCH), radius=radius)
+    side = pixels(radius) * PITCH
+    pad = GelPad(pitch=PITCH, size=(side, side), radius=radius)
     return sensor, pad.session(rng=rng) if noisy else pad.ideal()
 
 

@@ -50,25 +50,27 @@ class Pressed:
         return told
 
 
-def model_of(shape: str) -> mujoco.MjModel:
+def model_of(shape: str, radius: float = RADIUS) -> mujoco.MjModel:
     """A free pad and a shape at the origin, its axis along z."""
     spec = mujoco.MjSpec.from_string(_TORUS if shape == "torus" else "<mujoco/>")
     body = spec.worldbody.add_body(name="tip", pos=[1.0, 0.0, 0.0])
     body.add_freejoint(name="tip")
-    body.add_geom(name="pad", type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[RADIUS, 0.0, 0.0], mass=0.01)
+    body.add_geom(name="pad", type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[radius, 0.0, 0.0], mass=0.01)
     if shape in SHAPES:
         kind, size = SHAPES[shape]
         spec.worldbody.add_geom(name="object", type=kind, size=size)
-    add_skin(spec, "pad", RADIUS)
+    add_skin(spec, "pad", radius)
     model = spec.compile()
     settle_skins(model)
     return model
 
 
-def press(model: mujoco.MjModel, p: Array, n: Array, depth: float, *, along: Array) -> Pressed:
+def press(
+    model: mujoco.MjModel, p: Array, n: Array, depth: float, *, along: Array, radius: float = RADIUS
+) -> Pressed:
     """The pad laid on p with outward normal n and pressed in by `depth`."""
     data = mujoco.MjData(model)
-    data.joint("tip").qpos[:3] = p + (RADIUS - depth) * unit(n)
+    data.joint("tip").qpos[:3] = p + (radius - depth) * unit(n)
     x, y = basis_across(-unit(n))
     quat = np.empty(4)
     mujoco.mju_mat2Quat(quat, np.ascontiguousarray(np.stack([x, y, -unit(n)], axis=1)).ravel())

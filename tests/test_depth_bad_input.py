@@ -121,6 +121,13 @@ def test_a_clipped_image_is_flagged_and_read_from_what_is_left():
     assert np.all(np.abs(error) < 3.0 * sd_of_tensor(clipped))
 
 
+def test_an_image_clipped_all_over_is_flagged_and_says_little():
+    local = read_depth(np.full((48, 48), 2.5e-3), PITCH).surface()
+    assert "depth saturated" in local.flags
+    assert np.all(np.isfinite(local.point))
+    assert sd_of_tensor(local).min() > 10.0
+
+
 def test_depths_in_coarse_steps_are_not_taken_for_clipped():
     depth = np.round(pressed() / 8e-6) * 8e-6
     assert "depth saturated" not in read_depth(depth, PITCH, noise=NOISE).surface().flags

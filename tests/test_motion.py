@@ -154,6 +154,24 @@ def test_a_base_that_is_fixed_stays_and_the_joints_lead_to_the_object(plan):
     assert near(found.transfer.end, Configuration(plan.reach.q_standoff, X_WB))
 
 
+def test_joints_alone_go_round_when_the_straight_line_would_make_links_meet():
+    rng = np.random.default_rng(0)
+    free = [q for q in rng.uniform(HAND.lower, HAND.upper, (40, 16)) if COLLISION.is_self_free(q)]
+    begin, end = next(
+        (a, b) for a, b in pairwise(free)
+        if not all(COLLISION.is_self_free(a + u * (b - a)) for u in np.linspace(0.0, 1.0, 40))
+    )  # fmt: skip
+    fixed = ReachOptions(workspace=Workspace(HOME.X_WB))
+    movable = movable_among(HAND, COLLISION, believed_solid(BELIEF.surface), fixed, LIMITS)
+    ends = (Configuration(begin, HOME.X_WB), Configuration(end, HOME.X_WB))
+    found = plan_transfer(movable, *ends, wanted=0.02)
+    assert found.sampled
+    assert near(found.trajectory.begin, ends[0])
+    assert near(found.trajectory.end, ends[1])
+    for time in np.linspace(0.0, found.trajectory.duration, 40):
+        assert not raw_meshes_meet(found.trajectory.at(time).q, HOME.X_WB, [])
+
+
 def raw_meshes_meet(q, X_WB, boxes):
     """Pinocchio on the meshes themselves, no hulls: the pairs of links that could meet, and boxes.
 

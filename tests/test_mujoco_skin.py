@@ -16,8 +16,9 @@ from estimator.local_surface import LocalSurface
 from estimator.readers.raw_sensors import raw_sensor, with_depth
 from estimator.vectors import Array
 from sim_sensor.gel import GelPad
-from sim_sensor.mujoco_skin import PITCH, PIXELS
+from sim_sensor.mujoco_skin import PITCH, pixels
 
+SIDE = pixels(RADIUS) * PITCH
 DEPTH = 1e-3  # of a press [m]
 SPHEROID = (0.025, 0.060)  # half axes of the ellipsoid [m]
 
@@ -106,7 +107,7 @@ def errors(told: LocalSurface, clean: LocalSurface, X: Array) -> Array:
 def test_what_the_reader_says_of_its_errors_is_true_in_mujoco(where: str) -> None:
     """With a gel's noise and mounting errors that the reader is not told: 120 presses."""
     sensor = with_depth(raw_sensor("gel-depth"), pixel_pitch=PITCH, radius=RADIUS)
-    pad = GelPad(pitch=PITCH, size=(PIXELS * PITCH, PIXELS * PITCH), radius=RADIUS)
+    pad = GelPad(pitch=PITCH, size=(SIDE, SIDE), radius=RADIUS)
     rng = np.random.default_rng(1)
     squares = []
     for _ in range(120):
@@ -133,3 +134,15 @@ def test_depth_is_along_the_pads_own_z() -> None:
     assert np.rad2deg(np.arccos(-z @ n)) < 3.0  # the grid is aimed at the contact
     assert pressed.depth.max() == pytest.approx(DEPTH, rel=0.02)
     assert pressed.depth.min() == 0.0
+
+
+def test_a_small_pad_has_a_small_image() -> None:
+    """A fingertip of 6 mm: its dome has no place for 12 mm of pixels."""
+    small = 0.006
+    p, n, e, kappa = place_on("cylinder", 0.3, 0.01)
+    pressed = press(model_of("cylinder", small), p, n, 0.8e-3, along=e, radius=small)
+    assert pressed.depth.shape == (28, 28)
+    told = with_depth(raw_sensor("gel-depth"), pixel_pitch=PITCH, radius=small).read(pressed.depth)
+    assert told is not None
+    assert told.tensor[0, 0] == pytest.approx(kappa[0], rel=0.2)
+    assert told.tensor[1, 1] == pytest.approx(0.0, abs=6.0)

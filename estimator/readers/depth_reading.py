@@ -114,6 +114,8 @@ def place_only(cells: Array, radius: float, centre: Array, terms: Array) -> None
     """Of a contact too small to fit: its deepest cell, the pad's own slope, no curvature."""
     i, j, peak = deepest_cell(cells)
     centre[0], centre[1] = cells[X, i, j], cells[Y, i, j]
+    if peak == -np.inf:  # every cell is clipped: somewhere
+        centre[:], peak = 0.0, 0.0
     dome_terms(centre[0], centre[1], radius, terms)
     terms[0] -= peak
     terms[3:] = 0.0
