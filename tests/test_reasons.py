@@ -35,7 +35,7 @@ def test_a_pad_that_cannot_be_turned_far_enough_is_named_with_how_far_it_can():
     told = re.match(r"(\w+): pad normal (\d+) deg off at best \(cone 25\)", found.reason)
     assert told
     assert told[1] in found.fingers
-    wide = replace(narrow, cone=np.radians(float(told[2]) + 1.0), rescues=4, starts=16)
+    wide = replace(narrow, cone=np.radians(float(told[2]) + 4.0), rescues=4, starts=16)
     assert isinstance(ReachSolver(HAND, wide).solve(*target, motion="none"), Reach)
 
 
