@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import refused, script
+from commands import here, refused, script
 
 from estimator.axis import Axis
 from estimator.sensors import sensor_noise
@@ -101,10 +101,10 @@ def test_a_flat_tip_is_met_by_a_sphere_that_touches_where_it_does():
 
 
 def test_what_cannot_be_described_is_told_in_one_line(tmp_path):
-    refused(script("describe_hand", tmp_path / "no.urdf", "--out", tmp_path), "is not a file")
+    refused(here("describe_hand", tmp_path / "no.urdf", "--out", tmp_path), "is not a file")
     link = tmp_path / "still.urdf"
     link.write_text('<robot name="still"><link name="stone"/></robot>')
-    refused(script("describe_hand", link, "--out", tmp_path), "no joint moves anything")
+    refused(here("describe_hand", link, "--out", tmp_path), "no joint moves anything")
     with pytest.raises(HandError, match="no link 'hand' for base; links are pelvis"):
         propose_description(G1, base="hand")
     turning = ROBOTS / "kinova_description" / "robots" / "kinova.urdf"

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from commands import DATA, refused, script
+from commands import DATA, here, refused, script
 
 from estimator.readers.raw_files import read_raw
 
@@ -90,17 +90,17 @@ def test_estimate_axis_reads_raw_touches_as_the_main_job_did(raw_job):
 
 def test_estimate_axis_takes_one_file_of_either_kind(tmp_path, raw_job):
     raw = raw_job[1] / "raw.npz"
-    refused(script("estimate_axis"), "expected one file: of contacts (JSON), or of raw touches")
-    refused(script("estimate_axis", DATA / "table8.json", "--raw", raw), "expected one file")
-    refused(script("estimate_axis", "--raw", tmp_path / "none.npz"), "there is no such file")
-    refused(script("estimate_axis", "--raw", raw, "--sensor", "taxel-array"), "reads strains")
-    refused(script("estimate_axis", "--raw", raw, "--sensor", "gel"), "raw sensor 'gel' is unknown")
+    refused(here("estimate_axis"), "expected one file: of contacts (JSON), or of raw touches")
+    refused(here("estimate_axis", DATA / "table8.json", "--raw", raw), "expected one file")
+    refused(here("estimate_axis", "--raw", tmp_path / "none.npz"), "there is no such file")
+    refused(here("estimate_axis", "--raw", raw, "--sensor", "taxel-array"), "reads strains")
+    refused(here("estimate_axis", "--raw", raw, "--sensor", "gel"), "raw sensor 'gel' is unknown")
 
 
 def test_estimate_axis_refuses_what_it_cannot_read(tmp_path):
-    refused(script("estimate_axis", tmp_path / "none.json"), "none.json: cannot be read")
-    refused(script("estimate_axis", DATA / "table8.json", "--only", 13), "--only 13")
-    refused(script("estimate_axis", DATA / "table8.json", "--sensor", "nose"), "known are")
+    refused(here("estimate_axis", tmp_path / "none.json"), "none.json: cannot be read")
+    refused(here("estimate_axis", DATA / "table8.json", "--only", 13), "--only 13")
+    refused(here("estimate_axis", DATA / "table8.json", "--sensor", "nose"), "known are")
 
 
 @pytest.mark.parametrize(
@@ -116,4 +116,4 @@ def test_estimate_axis_refuses_what_it_cannot_read(tmp_path):
     ],
 )
 def test_estimate_axis_refuses_assumptions_that_are_none(option, value, message):
-    refused(script("estimate_axis", DATA / "table8.json", option, value), message)
+    refused(here("estimate_axis", DATA / "table8.json", option, value), message)

@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from commands import refused, script
+from commands import here, refused, script
 
 
 @pytest.fixture(scope="module")
@@ -96,20 +96,20 @@ def test_a_sphere_is_never_claimed_to_be_known(tmp_path):
 )
 def test_bad_options_are_refused_and_nothing_is_written(arguments, message, tmp_path):
     out = tmp_path / "out"
-    refused(script("plan_grasp", "--out", out, *arguments), message)
+    refused(here("plan_grasp", "--out", out, *arguments), message)
     assert not out.exists()
 
 
 def test_output_that_cannot_be_written_is_refused_before_the_work(tmp_path):
     blocked = tmp_path / "file"
     blocked.write_text("")
-    refused(script("plan_grasp", "--out", blocked / "out"), "cannot be written")
+    refused(here("plan_grasp", "--out", blocked / "out"), "cannot be written")
 
 
 def test_a_profile_that_folds_back_is_refused(tmp_path):
     csv = tmp_path / "fold.csv"
     csv.write_text("r_mm,z_mm\n30,0\n31,10\n32,5\n33,20\n34,30\n")
-    refused(script("plan_grasp", "--object", csv, "--out", tmp_path / "out"), "fold")
+    refused(here("plan_grasp", "--object", csv, "--out", tmp_path / "out"), "fold")
 
 
 def test_an_object_out_of_reach_is_refused_and_nothing_is_written(tmp_path):
@@ -163,11 +163,11 @@ def test_benchmark_of_estimators_runs(tmp_path):
 
 
 def test_benchmark_refuses_before_it_runs(tmp_path):
-    refused(script("benchmark", "touches", "--out", tmp_path), "")
-    refused(script("benchmark", "touches", "--settings", "easy"), "--settings: expected some of")
-    refused(script("benchmark", "touches", "--families", "teapot"), "--families: expected some")
-    refused(script("benchmark", "touches", "--arms", "guess"), "--arms: expected some of planned")
-    refused(script("benchmark", "touches", "--runs", 0), "--runs, --budget and --jobs")
+    refused(here("benchmark", "touches", "--out", tmp_path), "")
+    refused(here("benchmark", "touches", "--settings", "easy"), "--settings: expected some of")
+    refused(here("benchmark", "touches", "--families", "teapot"), "--families: expected some")
+    refused(here("benchmark", "touches", "--arms", "guess"), "--arms: expected some of planned")
+    refused(here("benchmark", "touches", "--runs", 0), "--runs, --budget and --jobs")
 
 
 @pytest.mark.parametrize(
@@ -182,7 +182,7 @@ def test_benchmark_refuses_before_it_runs(tmp_path):
     ],
 )
 def test_benchmark_of_estimators_refuses_before_it_runs(arguments, message):
-    refused(script("benchmark", "estimators", *arguments), message)
+    refused(here("benchmark", "estimators", *arguments), message)
 
 
 @pytest.mark.parametrize("name", ["plan_grasp", "estimate_axis", "benchmark"])
