@@ -111,13 +111,13 @@ def _require_sane(options: Options) -> None:
 def tables(
     setting: str, arms: tuple[str, ...], families: tuple[str, ...], outcomes: list[Outcome]
 ) -> tuple[Table, Table]:
-    """How well the axis is known after one and two placements, and how sessions end.
+    """How well the axis is known early on, and how sessions end.
 
-    After one: median errors; right labels, also after one more touch where they were in doubt.
-    After two: root mean square errors. `< 0.08`: plans that came so near to a singularity.
+    As soon as three contacts are felt: median errors; right labels, also after one more touch where
+    they were not. One placement more: root mean square errors. `< 0.08`: plans that came so near to a singularity.
     """
     errors = _table(
-        f"{setting}: after one placement; after two, rms",
+        f"{setting}: with three contacts; one placement more, rms",
         ("family", "arm", "runs", "deg", "p95", "mm", "labels %", "one more", "2: deg", "2: mm"),
     )
     ends = _table(

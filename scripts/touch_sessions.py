@@ -75,11 +75,12 @@ class Outcome:
     """What came of it; errors are of the likeliest axis, NaN where nothing was felt.
 
     Args:
-        first_deg, first_mm: After the first placement.
-        labels, labels_soon: Whether three contacts' labels were right then, and if not, after the
-            next touch or placement.
+        first_touches: Made until three contacts or more were felt, in whole placements.
+        first_deg, first_mm: Then.
+        labels, labels_soon: Whether their labels were right then, and if not, after the next touch
+            or placement.
         margin: Of the first three contacts on the true object, from the nearest singularity [-].
-        second_deg, second_mm: After a second placement of three.
+        second_deg, second_mm: After one more placement of three.
         touches, placements: Until the goal was met, or all there were.
         met, verdict, wrong: How the session ended; wrong where it was determined and beyond four
             standard deviations or twice the goal.
@@ -88,6 +89,7 @@ class Outcome:
     """
 
     job: Job
+    first_touches: int = 0
     first_deg: float = np.nan
     first_mm: float = np.nan
     labels: bool = False
@@ -154,9 +156,11 @@ class _Session:
         rng, start = np.random.default_rng([self.job.seed, 1]), time.perf_counter()
         try:
             for step in self._steps(belief, rng):
-                if outcome.touches == 0:
-                    outcome = self._after_first(outcome, step, time.perf_counter() - start)
-                elif outcome.placements == 1 and not outcome.labels:
+                if outcome.placements == 0:
+                    outcome = replace(outcome, plan_seconds=time.perf_counter() - start)
+                if outcome.first_touches == 0 and len(step.after.contacts) >= 3:
+                    outcome = self._after_first(outcome, step)
+                elif outcome.first_touches == outcome.touches and not outcome.labels:
                     outcome = replace(outcome, labels_soon=self._labels_right(step.after))
                 outcome = self._ended(outcome, step)
         except NoPlan as error:
@@ -185,15 +189,14 @@ class _Session:
         felt = self.world.touch(probe.approach)
         return felt if isinstance(felt, Miss) else replace(felt, noise=self.told)
 
-    def _after_first(self, outcome: Outcome, step: Step, seconds: float) -> Outcome:
-        if not step.after.contacts:
-            return replace(outcome, plan_seconds=seconds)
+    def _after_first(self, outcome: Outcome, step: Step) -> Outcome:
         angle, offset = self._errors(step.after)
         second = self._second(step.after) if self.job.arm != "oracle" else (np.nan, np.nan)
         right = self._labels_right(step.after)
         return replace(
-            outcome, first_deg=angle, first_mm=offset, labels=right, labels_soon=right,
-            margin=self._margin(), second_deg=second[0], second_mm=second[1], plan_seconds=seconds,
+            outcome, first_touches=step.touches, first_deg=angle, first_mm=offset,
+            labels=right, labels_soon=right, margin=self._margin(),
+            second_deg=second[0], second_mm=second[1],
         )  # fmt: skip
 
     def _second(self, belief: Belief) -> tuple[float, float]:

@@ -136,7 +136,7 @@ def test_benchmark_of_touches_runs(tmp_path):
     chosen = ("--runs", 1, "--families", "barrel", "--settings", "coarse", "--out", lines)
     done = script("benchmark", "touches", *chosen, "--arms", "planned", "oracle", "--budget", 6)
     assert done.returncode == 0, done.stderr
-    assert "after one placement" in done.stdout
+    assert "with three contacts" in done.stdout
     runs = [json.loads(line) for line in lines.read_text().splitlines()]
     assert sorted(run["job"]["arm"] for run in runs) == ["oracle", "planned"]
     assert all(run["first_deg"] < 30.0 for run in runs)
