@@ -114,7 +114,8 @@ def tables(
     """How well the axis is known early on, and how sessions end.
 
     As soon as three contacts are felt: median errors; right labels, also after one more touch where
-    they were not. One placement more: root mean square errors. `< 0.08`: plans that came so near to a singularity.
+    they were not. One placement more: root mean square errors. `< 0.08`: share of triples that came
+    so near to a singularity.
     """
     errors = _table(
         f"{setting}: with three contacts; one placement more, rms",
