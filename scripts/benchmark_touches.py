@@ -13,7 +13,7 @@ Settings
     offset   coarse, and the sensor turns all directions by 8 deg without telling anybody
     told     the same, but planner and estimator know that there may be such an offset
 
-Prints medians with half their 95 % bootstrap intervals; the counts are the runs.
+Prints medians and shares with half their 95 % intervals; the counts are the runs.
 
 Example: python scripts/benchmark.py touches --runs 20 --families cone vase
 """
@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -110,53 +111,68 @@ def _require_sane(options: Options) -> None:
 
 def tables(
     setting: str, arms: tuple[str, ...], families: tuple[str, ...], outcomes: list[Outcome]
-) -> tuple[Table, Table]:
+) -> tuple[Table, ...]:
     """How well the axis is known early on, and how sessions end.
 
     As soon as three contacts are felt: median errors; right labels, also after one more touch where
     they were not. One placement more: root mean square errors. `< 0.08`: share of triples that came
     so near to a singularity.
     """
-    errors = _table(
-        f"{setting}: with three contacts; one placement more, rms",
-        ("family", "arm", "runs", "deg", "p95", "mm", "labels %", "one more", "2: deg", "2: mm"),
+    parts = (
+        ("with three contacts", ("deg", "p95", "mm", "labels %", "soon %"), _early),
+        ("after one placement more, rms", ("deg", "mm"), _later),
+        ("sessions to 3 deg and 2 mm",
+         ("goal met %", "touches", "mean", "wrong", f"< {MARGIN:g}", "plan s"), _ends),
+    )  # fmt: skip
+    return tuple(
+        _filled(_table(f"{setting}: {title}", ("family", "arm", "runs", *headings)), row, chosen)
+        for title, headings, row in parts
+        for chosen in [_cells(setting, arms, families, outcomes)]
     )
-    ends = _table(
-        f"{setting}: sessions to 3 deg and 2 mm",
-        ("family", "arm", "goal met %", "touches", "mean", "wrong", f"< {MARGIN:g}", "plan s"),
-    )
-    for family in (*families, "all"):
-        for arm in arms:
-            chosen = [
-                o
-                for o in outcomes
-                if (o.job.setting, o.job.arm) == (setting, arm) and family in (o.job.family, "all")
-            ]
-            errors.add_row(family, arm, *_errors(chosen))
-            ends.add_row(family, arm, *_ends(chosen))
-    return errors, ends
+
+
+Cells = list[tuple[str, str, list[Outcome]]]
+
+
+def _cells(
+    setting: str, arms: tuple[str, ...], families: tuple[str, ...], outcomes: list[Outcome]
+) -> Cells:
+    """Family, arm and their outcomes; "all" families last."""
+    mine = [o for o in outcomes if o.job.setting == setting]
+    return [
+        (family, arm, [o for o in mine if o.job.arm == arm and family in (o.job.family, "all")])
+        for family in (*families, "all")
+        for arm in arms
+    ]
+
+
+def _filled(table: Table, row: Callable[[list[Outcome]], list[str]], cells: Cells) -> Table:
+    for family, arm, chosen in cells:
+        table.add_row(family, arm, str(len(chosen)), *row(chosen))
+    return table
 
 
 def _table(title: str, headings: tuple[str, ...]) -> Table:
-    table = Table(title=title, box=SIMPLE_HEAD, pad_edge=False)
+    table = Table(title=title, box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
     for heading in headings:
         side = "left" if heading in ("family", "arm") else "right"
         table.add_column(heading, justify=side, no_wrap=True)
     return table
 
 
-def _errors(chosen: list[Outcome]) -> list[str]:
+def _early(chosen: list[Outcome]) -> list[str]:
     deg, mm = (_values(chosen, name) for name in ("first_deg", "first_mm"))
     return [
-        str(len(chosen)),
         _figure(bootstrap(deg, np.median)),
         f"{np.percentile(deg, 95):.1f}" if len(deg) else "-",
         _figure(bootstrap(mm, np.median)),
         _share([o.labels for o in chosen]),
         _share([o.labels_soon for o in chosen]),
-        _figure(bootstrap(_values(chosen, "second_deg"), _rms)),
-        _figure(bootstrap(_values(chosen, "second_mm"), _rms)),
     ]
+
+
+def _later(chosen: list[Outcome]) -> list[str]:
+    return [_figure(bootstrap(_values(chosen, f"second_{unit}"), _rms)) for unit in ("deg", "mm")]
 
 
 def _ends(chosen: list[Outcome]) -> list[str]:
@@ -185,7 +201,7 @@ def _rms(values: Array, axis: int) -> Array:
 
 def _share(hits: list[bool]) -> str:
     share = proportion(np.array(hits, dtype=bool))
-    return f"{100 * share.value:.0f} [{100 * share.low:.0f}-{100 * share.high:.0f}]"
+    return f"{100 * share.value:.0f} ±{50 * (share.high - share.low):.0f}"
 
 
 def _figure(figure: Interval) -> str:
