@@ -32,6 +32,7 @@ FEIGNED = 10.0  # real readings fit a little worse than their model: their p-val
 ALARM = 0.01  # probability of a false alarm at a placement, by either test
 WALL = 0.7  # |n . u| beyond which a contact is not on the wall
 ONCE_BITTEN = 0.1  # the same after a first alarm, when the next placement has to agree
+AGREES = 0.1  # from where later touches confirm earlier ones; doubtful agreement asks for more
 MENTIONED = 0.01  # hypotheses that may be the right one
 RESTLESS = 3  # surprises from which the object counts as moving all the time
 LEAST_MOTION = (3e-3, float(np.deg2rad(3.0)))  # rms by which a belief is widened [m], [rad]
@@ -86,7 +87,7 @@ def learn(known: Learnt, outcomes: Sequence[Contact | Miss]) -> Learnt:
     belief = update(known.belief, felt)
     motion = motion_between(known.belief, belief, felt)
     if motion is None or motion.p_value > (ONCE_BITTEN if known.surprises else ALARM):
-        settled = known.settled or motion is not None
+        settled = known.settled or (motion is not None and motion.p_value > AGREES)
         return replace(known, belief=belief, settled=settled, surprise=None)
     surprises, restless = known.surprises + 1, known.restless
     words = f"{motion.words}. Earlier contacts now count only as a wider prior"
