@@ -50,7 +50,7 @@ def assert_keeps_every_rule(reach, points, normals, solid):
         assert np.all((q >= HAND.lower - 1e-9) & (q <= HAND.upper + 1e-9))
         assert COLLISION.is_self_free(q)
         skip = tips if np.ndim(away) == 0 else ()
-        assert vertices_outside(q, reach.X_WB, solid, skip) > -2.5e-4
+        assert vertices_outside(q, reach.X_WB, solid, skip) > -2e-4
     cosine = -np.sum(HAND.at(reach.q, reach.X_WB).pad_normals[order] * normals, axis=1)
     assert cosine.min() >= np.cos(np.radians(40.0) + 2e-3)
 
@@ -113,7 +113,9 @@ def test_fingers_come_in_the_order_of_the_contacts():
     assert again.fingers == names
     assert again.tried == 1
     assert_keeps_every_rule(again, points[turned], normals[turned], solid)
-    np.testing.assert_allclose(again.q, reach.q, atol=0.25)  # nearer to where it starts
+    own = Start(reach.fingers, reach.q, reach.X_WB)
+    same = SOLVER.solve(points, normals, solid, fingers=reach.fingers, starts=[own])
+    np.testing.assert_allclose(again.q, same.q, atol=1e-3)  # the order changes nothing
 
 
 def test_the_base_stays_in_its_workspace():

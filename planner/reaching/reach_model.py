@@ -41,6 +41,7 @@ from planner.reaching.solid import PARAMETERS, RevolvedSolid, signed_distance
 Array = NDArray[np.float64]
 
 _RETREATED = (0.5, 1.0)  # shares of an arm's retreat at which the hand is kept out of the object
+_BESIDE_PAD = 1e-4  # of what is fixed to a touching pad from the object: hulls stand out [m]
 _CENTRAL = 0.25  # of the way from the start to mid-range: where the joints rest
 _TURN_WEIGHT = 0.05
 _KNOT_WEIGHT = 0.1  # stand-off and overshoot postures need not be near
@@ -180,9 +181,11 @@ class ReachModel:
         distance = signed_distance(points, p.solid)
         table = p.table[:3].T @ points - p.table[3]
         nearest = ca.fmin(distance, table).T
-        # What is fixed to a touching pad cannot keep a distance, only out of the object.
+        # What is fixed to a touching pad cannot keep the distance, only out of the object.
         apart = ~np.isin(spheres.finger_indices[kept], self.fingers)
-        return (nearest - spheres.radii[kept] - p.clearance * ca.DM(apart.astype(float))) / LENGTH
+        asked = ca.if_else(ca.DM(apart.astype(float)), p.clearance, _BESIDE_PAD)
+        asked *= ca.DM((~spheres.is_pad[kept]).astype(float) + (spheres.is_pad[kept] & apart))
+        return (nearest - spheres.radii[kept] - asked) / LENGTH
 
 
 class Unknowns:
