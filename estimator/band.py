@@ -25,11 +25,17 @@ NODES = 15
 
 @dataclass(frozen=True, eq=False)
 class ProfileBand:
-    """Node heights z (k,) [m], mean radii (k,) [m] and their covariance (k, k) [m^2]."""
+    """Node heights z (k,) [m], mean radii (k,) [m] and their covariance (k, k) [m^2].
+
+    `by_axis` (k, 4) is by how much the mean exceeds the truth for an axis that lies at x in the
+    chart at the one it was read about: radii read on one side of an axis are too large, those on
+    the other too small, all by one error. None where no touch told of it. The covariance has it.
+    """
 
     z: Array
     mean: Array
     covariance: Array
+    by_axis: Array | None = None
 
     @property
     def profile(self) -> SplineProfile:
@@ -52,6 +58,12 @@ class ProfileBand:
         H = self._rows(z)[0]
         return H @ self.mean, np.asarray(H @ self.covariance @ H.T)
 
+    def radii_by_axis(self, z: Array) -> Array:
+        """By how much the mean radii at heights z (m,) exceed the truth with the axis, (m, 4)."""
+        if self.by_axis is None:
+            return np.zeros((len(z), 4))
+        return np.asarray(self._rows(z)[0] @ self.by_axis)
+
     def conditioned(self, told: ProfileReadings) -> ProfileBand:
         """The band after radii, slopes and second derivatives were read at some heights."""
         H = np.vstack(self._rows(told.z))
@@ -59,7 +71,8 @@ class ProfileBand:
         gain = np.linalg.solve(H @ self.covariance @ H.T + told.covariance, H @ self.covariance).T
         mean = self.mean + gain @ (read - H @ self.mean)
         covariance = self.covariance - gain @ H @ self.covariance
-        return ProfileBand(self.z, frozen(mean), frozen(0.5 * (covariance + covariance.T)))
+        covariance = frozen(0.5 * (covariance + covariance.T))
+        return ProfileBand(self.z, frozen(mean), covariance, frozen(gain @ told.by_axis))
 
     def sample(self, count: int, *, rng: np.random.Generator) -> Array:
         """Node radii drawn from the band, kept above a fifth of the mean, (count, k) [m]."""

@@ -39,7 +39,8 @@ UNREAD = 1e3  # sd of a curvature that was not read, far above any in reach of a
 class ProfileReadings:
     """Heights z [m], radii r [m], slopes dr [-] and second derivatives ddr [1/m], each (m,).
 
-    `covariance` (3 m, 3 m) is that of all r, then all dr, then all ddr.
+    `covariance` (3 m, 3 m) is that of all r, then all dr, then all ddr, with the axis' part;
+    `by_axis` (3 m, 4) is by how much they exceed the truth for an axis at x in the chart.
     """
 
     z: Array
@@ -47,6 +48,7 @@ class ProfileReadings:
     dr: Array
     ddr: Array
     covariance: Array
+    by_axis: Array
 
 
 def profile_readings(
@@ -78,7 +80,8 @@ def profile_readings(
     sd_normal = np.array([c.noise.normal for c in contacts])
     own = _own_sd(dr, ddr, sd_position[wall], sd_normal[wall], kappa_sd)
     J = _axis_jacobian(z, r, dr, ddr, rad @ basis_across(axis.direction).T)
-    return ProfileReadings(z, r, dr, ddr, np.diag(own**2) + J @ hypothesis.covariance @ J.T)
+    covariance = np.diag(own**2) + J @ hypothesis.covariance @ J.T
+    return ProfileReadings(z, r, dr, ddr, covariance, J)
 
 
 def _own_sd(dr: Array, ddr: Array, position: Array, normal: Array, kappa: Array) -> Array:

@@ -70,7 +70,7 @@ class Learnt:
         settled: Whether later touches agreed with earlier ones, after the last that did not: a goal
             that is met by touches nothing confirmed does not count.
         surprise: What the last touches contradicted and what was done; None where nothing.
-        surprises: How often that happened.
+        surprises: How often that happened beyond doubt.
         restless: By how much every contact counts as worse placed [m].
     """
 
@@ -89,9 +89,9 @@ def learn(known: Learnt, outcomes: Sequence[Contact | Miss]) -> Learnt:
     if motion is None or motion.p_value > (ONCE_BITTEN if known.surprises else ALARM):
         settled = known.settled or (motion is not None and motion.p_value > AGREES)
         return replace(known, belief=belief, settled=settled, surprise=None)
-    surprises, restless = known.surprises + 1, known.restless
+    surprises, restless = known.surprises + (motion.p_value <= ALARM), known.restless
     words = f"{motion.words}. Earlier contacts now count only as a wider prior"
-    if surprises >= RESTLESS:
+    if surprises >= RESTLESS and motion.p_value <= ALARM:
         restless = max(restless, motion.shift, LEAST_MOTION[0])
         felt = tuple(_as_sure(touch, restless) for touch in outcomes)
         words = f"{words}; it keeps happening, so contacts count as {1e3 * restless:.0f} mm worse"
@@ -134,11 +134,15 @@ def _off_the_wall(before: Belief, contacts: Sequence[Contact]) -> tuple[float, i
     p = np.array([c.position for c in on_wall])
     _, rho, z = before.surface.cylindrical(p)
     mean, covariance = before.band.radii(z)
-    out = (p - before.axis.foot(p)) / rho[:, None]
-    across = -out @ basis_across(u).T
-    J = np.hstack([across, across * z[:, None]])
+    across = (p - before.axis.foot(p)) / rho[:, None] @ basis_across(u).T
+    met = np.hstack([across, z[:, None] * across])
+    expected = before.band.radii_by_axis(z)
+    # One error of the axis errs what is met and what was expected: alike on one side of the axis,
+    # against each other on two.
+    J = met - expected
+    own = covariance - expected @ before.covariance @ expected.T
     noise = np.diag([c.noise.position**2 + c.noise.position_bias**2 for c in on_wall])
-    total = covariance + J @ before.covariance @ J.T + noise
+    total = own + J @ before.covariance @ J.T + noise
     return float((rho - mean) @ np.linalg.solve(total, rho - mean)), len(on_wall)
 
 
@@ -166,11 +170,16 @@ def _carried(reference: Axis, other: Hypothesis) -> Array:
 
 
 def after_motion(before: Belief, later: Sequence[Contact | Miss], motion: Motion) -> Belief:
-    """The belief after the object moved: earlier contacts only as a widened prior."""
+    """The belief after the object moved: earlier contacts only as a widened prior.
+
+    What they told of the profile is kept as the likeliest shape, as doubtful as before any touch:
+    it was read about an axis that may never have been the object's.
+    """
     shift, tilt = max(motion.shift, LEAST_MOTION[0]), max(motion.tilt, LEAST_MOTION[1])
     widened = before.covariance + 0.5 * np.diag([shift, shift, tilt, tilt]) ** 2
     prior = AxisPrior(before.axis, widened, before.prior.radius, before.prior.radius_sd)
-    band = _shifted(before.band, shift, tilt)
+    doubted = replace(before.band, covariance=before.prior_band.covariance)
+    band = _shifted(doubted, shift, tilt)
     start = Hypothesis(prior.axis, prior.covariance, 1.0, 0.0, frozen(np.zeros(0)))
     return update(Belief(prior, band, (start,), band), later)
 

@@ -40,7 +40,8 @@ def touches(profile, noise="ideal", axis=AXIS):
 
 def told(z, r, dr, ddr, sds):
     values = [np.atleast_1d(np.asarray(x, float)) for x in (z, r, dr, ddr)]
-    return ProfileReadings(*values, covariance=np.diag(np.repeat(sds, len(values[0]))) ** 2)
+    covariance = np.diag(np.repeat(sds, len(values[0]))) ** 2
+    return ProfileReadings(*values, covariance=covariance, by_axis=np.zeros((len(covariance), 4)))
 
 
 def test_conditioning_a_band_is_exact_linear_gaussian():
@@ -242,3 +243,24 @@ def test_true_radii_lie_in_the_95_percent_band(family):
         inside.append(np.abs(surface.profile.derivatives(z)[0] - mean) < 1.96 * sd)
     assert len(inside) >= 55
     assert 0.90 <= np.mean(inside) <= 0.985
+
+
+def test_a_band_knows_how_it_errs_with_the_axis_it_was_read_about():
+    """Against bands about axes that lie elsewhere, by differences."""
+    profile, step = barrel(0.033, 6.0, HEIGHT), 1e-6
+    sure = hypothesis(4, covariance=np.diag([1e-3, 1e-3, 0.02, 0.02]) ** 2)
+    heights = np.array([-0.03, 0.0, 0.02])
+
+    def band(x):
+        contacts = touches(profile, "gel", axis=from_chart(AXIS, x))
+        prior = coarse_band(0.033, 0.005, (-0.05, 0.05))
+        return prior.conditioned(profile_readings(contacts, sure))
+
+    J = np.array(
+        [band(x).radius(heights)[0] - band(-x).radius(heights)[0] for x in step * np.eye(4)]
+    )
+    got = band(np.zeros(4)).radii_by_axis(heights)
+    assert np.abs(got[:, :2]).max() > 0.05
+    scale = np.array([1e-3, 1e-3, 0.02, 0.02])
+    np.testing.assert_allclose(got * scale, J.T / (2.0 * step) * scale, atol=1e-4)
+    assert not coarse_band(0.03, 0.005, (-0.05, 0.05)).radii_by_axis(heights).any()

@@ -72,6 +72,32 @@ def test_what_was_learnt_of_an_object_that_moved_holds_where_it_is_now():
     assert x @ np.linalg.solve(moved.belief.covariance, x) < 24.5
 
 
+def test_what_was_learnt_of_the_shape_is_doubted_when_the_object_moved():
+    """It may have been read about a wrong axis: as wide as before any touch, or wider."""
+    scene = Scene(0)
+    known = learn(Learnt(scene.belief), scene.touched()[0])
+    moved = learn(known, scene.touched(10e-3)[0])
+    assert np.all(moved.belief.prior_band.sd >= scene.belief.prior_band.sd)
+    assert np.all(known.belief.band.sd < scene.belief.prior_band.sd)
+
+
+def test_a_doubtful_contradiction_is_not_taken_for_an_object_that_never_rests():
+    """Between the two alarm levels the last touches count alone, and others have to agree."""
+    found = 0
+    for seed in range(12):
+        scene = Scene(seed)
+        known = learn(Learnt(scene.belief), scene.touched()[0])
+        known = replace(known, surprises=2)
+        later = scene.touched(2e-3)[0]
+        motion = motion_between(known.belief, update(known.belief, later), later)
+        if ALARM < motion.p_value < 0.1:
+            after, found = learn(known, later), found + 1
+            assert after.surprise is not None
+            assert not after.settled
+            assert after.restless == 0.0
+    assert found > 0
+
+
 def test_a_miss_confirms_nothing():
     scene = Scene(0)
     known = learn(Learnt(scene.belief), scene.touched()[0])
