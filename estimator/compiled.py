@@ -3,14 +3,16 @@
 Compiled once a machine (half a minute at the first call), then loaded from the user's cache
 folder: AXIS_BY_TOUCH_CACHE, else XDG_CACHE_HOME, else ~/.cache. numba renews a function only when
 its own file changes, although it holds the code of every function it calls; so the folder is named
-after all of this package's sources.
+after all sources of this package and of the function's own.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
+import sys
 from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -22,17 +24,18 @@ F = TypeVar("F", bound=Callable[..., Any])
 V3 = tuple[float, float, float]
 
 
-def _folder() -> Path:
-    """Where code compiled from exactly these sources is kept."""
+@lru_cache
+def _folder(package: Path) -> Path:
+    """Where code of a package compiled from exactly these sources is kept."""
     digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.rglob("*.py")):
-        digest.update(path.read_bytes())
+    for folder in sorted({Path(__file__).parent, package}):
+        for path in sorted(folder.rglob("*.py")):
+            digest.update(path.read_bytes())
     named = os.environ.get("AXIS_BY_TOUCH_CACHE")
     user = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "axis-by-touch"
     return (Path(named) if named else user) / f"compiled-{digest.hexdigest()[:16]}"
 
 
-_FOLDER = str(_folder())
 FAST = {"contract", "reassoc", "nsz", "arcp"}
 
 
@@ -41,8 +44,9 @@ def compiled(function: F) -> F:
 
     Sums may be contracted and reordered, infinities and NaN keep their meaning.
     """
+    package = sys.modules[function.__module__.partition(".")[0]]
     other = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = _FOLDER  # read while a function is decorated
+    numba.config.CACHE_DIR = str(_folder(Path(str(package.__file__)).parent))  # read by the next
     try:
         return cast(F, numba.njit(cache=True, error_model="numpy", fastmath=FAST)(function))
     finally:

@@ -16,9 +16,9 @@ import pinocchio as pin
 
 from estimator.surface import SurfaceOfRevolution
 from estimator.vectors import Array, Index, Mask, unit
-from hand_models.batch import batch_placements
 from hand_models.hand import Hand
 from hand_models.spheres import LinkSpheres
+from planner.reaching.clear import clear_of
 from planner.reaching.laying import Laid, lay
 from planner.reaching.reach_map import ReachMap
 from planner.reaching.workspace import Workspace
@@ -27,7 +27,6 @@ END_MARGIN = 0.08  # of the believed height, kept from both ends
 FITTING = 5  # steps from a cylinder to the believed surface
 TURNS = 48  # about the object's axis, where the base is bounded
 GAP = 2e-3  # of a laid pad from the surface that reach will close [m]
-INTRUSION = 4e-3  # of a link sphere into the believed object that reach will remove [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,15 +171,10 @@ def clear_of_object(
     R_WB: Array,
     p_WB: Array,
 ) -> Mask:
-    """Whether no link but the pads enters the believed object by more than INTRUSION, (N,)."""
-    if len(q) == 0:
-        return np.zeros(0, dtype=bool)
-    near_pad = spheres.finger_indices >= 0
-    local = spheres.positions(batch_placements(hand, q))
-    world = np.einsum("nij,nmj->nmi", R_WB, local) + p_WB[:, None]
-    clearance = surface.signed_distance(world) - spheres.radii
-    allowed = np.where(near_pad, -2.0 * INTRUSION, -INTRUSION)
-    return np.asarray(np.all(clearance > allowed, axis=1))
+    """Whether links stay out of the believed object, coarsely (`clear_of`), (N,)."""
+    R_OB = surface.frame @ R_WB
+    p_OB = (p_WB - surface.axis.point) @ surface.frame.T
+    return clear_of(hand, spheres, surface.profile, q, R_OB, p_OB)
 
 
 def single_candidates(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
@@ -39,6 +40,7 @@ __all__ = ["NoPlan", "Plan", "Probe", "plan_preferred", "plan_probes"]
 Preference = Callable[[Candidates, Ranking], Index]
 
 RISK_OBJECTS = 40
+REFINED = 6  # of the best placements are handed to the optimiser, where none settles without
 
 
 class _Made(NamedTuple):
@@ -142,15 +144,22 @@ def _best_placement(
         ranking = replace(ranking, order=prefer(candidates, ranking))
     funnel += tuple((f"{count} fingers: singular: {words}", n) for words, n in ranking.rejected)
     solid = believed_solid(belief.surface)
-    failures: dict[str, int] = {}
-    for i in ranking.order[: options.tries].tolist():
-        made = _made(tools, belief, options, solid, candidates, i)
+    failures: dict[int, str] = {}
+    best = ranking.order[: options.tries].tolist()
+    for i, quick in [*((i, True) for i in best), *((i, False) for i in best[:REFINED])]:
+        made = _made(tools, belief, options, solid, candidates, i, quick=quick)
         if isinstance(made, _Made):
-            refused = tuple((f"{count} fingers: out of reach: {r}", n) for r, n in failures.items())
-            plan = _plan(belief.surface, sensor, candidates, ranking, i, made, funnel + refused)
+            funnel += _refused(count, failures)
+            plan = _plan(belief.surface, sensor, candidates, ranking, i, made, funnel)
             return _judged(plan, worth, ranking, i, scored, options, rng)
-        failures[made] = failures.get(made, 0) + 1
-    return funnel + tuple((f"{count} fingers: out of reach: {r}", n) for r, n in failures.items())
+        failures[i] = made
+    return funnel + _refused(count, failures)
+
+
+def _refused(count: int, failures: dict[int, str]) -> Funnel:
+    """Reasons of the candidates that were tried in vain, with their numbers."""
+    reasons = Counter(failures.values())
+    return tuple((f"{count} fingers: out of reach: {why}", n) for why, n in reasons.items())
 
 
 def _judged(
@@ -181,6 +190,8 @@ def _made(
     solid: RevolvedSolid,
     candidates: Candidates,
     i: int,
+    *,
+    quick: bool,
 ) -> _Made | str:
     """A certified reach with the ways to it and out, or the reason why there is none."""
     place = belief.surface.at(candidates.theta[i], candidates.z[i])
@@ -195,6 +206,7 @@ def _made(
         fingers=names,
         starts=[start],
         motion="arm" if by_base else "fingers",
+        quick=quick,
     )
     if isinstance(reach, Unreachable):
         return reach.reason

@@ -10,10 +10,10 @@ from hand_models.batch import batch_placements
 from hand_models.collision import HandCollision
 from hand_models.hand import Hand
 from hand_models.spheres import LinkSpheres
-from planner.candidates import INTRUSION
 from planner.grasping.closing import Bodies
 from planner.grasping.grasp_outcome import Grasp
 from planner.motions.motion import Approach
+from planner.reaching.clear import INTRUSION
 from planner.reaching.reach import Reach
 from planner.reaching.reach_task import ReachOptions
 from planner.reaching.solid import RevolvedSolid

@@ -97,11 +97,9 @@ def _finger_approach(hand: Hand, reach: Reach, i: int, collision: HandCollision)
     line = on_contact + along[:, None] * reach.normals[i]
     knots = [x[finger.q_indices] for x in (reach.q_standoff, reach.q, reach.q_overshoot)]
     path = np.repeat(reach.q_standoff[None], len(along), axis=0)
-    for k, s in enumerate(along):
-        path[k, finger.q_indices] = _between(knots, s, before, behind)
-        path[k] = pulled(hand, finger, reach.X_WB, path[k], line[k])
-    row = hand.fingers.index(finger)
-    tips = np.array([hand.at(q, reach.X_WB).pad_centres[row] for q in path])
+    path[:, finger.q_indices] = [_between(knots, s, before, behind) for s in along]
+    found = pulled(hand, finger, reach.X_WB, path, line)
+    path, tips = found.path, found.centres
     off_line = np.linalg.norm(tips - line, axis=1)
     end = _end(path, off_line, contact, collision)
     return Approach(

@@ -2,7 +2,8 @@
 
 Unknown are the joints and the six coordinates of the base. Gauss-Newton closes the gaps between
 pads and surface, turns the pads against it and keeps heights and joints inside their limits,
-moving as little as it can. The result is a start, good to a millimetre; `reach` makes it exact.
+moving as little as it can (`planner.kinematics.resting`). The result is a start, good to a
+millimetre; `reach` makes it exact.
 """
 
 from __future__ import annotations
@@ -12,17 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimator.surface import SurfaceOfRevolution
-from estimator.vectors import Array, Index, basis_across, cross, unit
-from hand_models.batch_pads import BatchPads, batch_pads
+from estimator.vectors import Array, Index, basis_across
+from hand_models.batch_pads import batch_pads
+from hand_models.chains import chains_of
 from hand_models.hand import Hand
+from planner.kinematics.meridian import meridian_of
+from planner.kinematics.resting import rest
 
 ITERATIONS = 14
-GAP_UNIT = 0.3e-3  # so far off the surface weighs as much as ...
-ANGLE_UNIT = 0.2  # ... this much of pad angle beyond the cone [rad]
-HEIGHT_UNIT = 1e-3  # ... or this far beyond the ends [m]
-JOINT_UNIT = 1.0  # how willingly a joint moves, in one step [rad]
-BASE_UNIT = (0.1, 0.1, 0.1, 3.0, 3.0, 3.0)  # ... and the base [m], [rad]
-LONGEST = (0.03, 0.4)  # of one step [m], [rad]
+_WITHIN = 0.8  # of the cone, where a pad's angle begins to count
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,101 +72,14 @@ def lay(
         poses: Where they start: `opening_poses`, or placements on something alike.
         iterations: Of Gauss-Newton.
     """
-    radius = np.array([f.pad_radius for f in hand.fingers])[fingers]
-    for _ in range(iterations):
-        pads = batch_pads(hand, poses.q)
-        at = touching(surface, poses, pads, fingers, radius)
-        poses = _moved(hand, poses, _step(at, surface.profile.z_range, 0.8 * cone), at)
-    at = touching(surface, poses, batch_pads(hand, poses.q), fingers, radius)
-    theta = np.arctan2(at.n[..., 1], at.n[..., 0])
-    return Laid(poses.q, poses.R, poses.p, theta, at.z, at.gap, at.angle)
-
-
-@dataclass(frozen=True, eq=False)
-class Touching:
-    """Pads against the surface, in O; (N, m), (N, m, 3) and Jacobians (N, m, 3, nq)."""
-
-    gap: Array
-    angle: Array
-    n: Array
-    pad: Array
-    centre: Array
-    rho: Array
-    z: Array
-    moves: Array
-    turns: Array
-
-
-def touching(
-    surface: SurfaceOfRevolution, poses: Poses, pads: BatchPads, fingers: Index, radius: Array
-) -> Touching:
-    """Where pads are with respect to the nearest places of the wall."""
-    rows = np.arange(len(fingers))[:, None]
-    R = poses.R[:, None]
-    centre = np.einsum("nij,nmj->nmi", poses.R, pads.centres[rows, fingers]) + poses.p[:, None]
-    pad = np.einsum("nij,nmj->nmi", poses.R, pads.normals[rows, fingers])
-    rho = np.maximum(np.hypot(centre[..., 0], centre[..., 1]), 1e-9)
-    z, r, dr = _foot(surface, rho, centre[..., 2])
-    w = np.sqrt(1.0 + dr**2)
-    n = np.concatenate([centre[..., :2] / rho[..., None], -dr[..., None]], -1) / w[..., None]
-    gap = ((rho - r) - dr * (centre[..., 2] - z)) / w - radius
-    angle = np.arccos(np.clip(-np.sum(pad * n, axis=-1), -1.0, 1.0))
-    moves, turns = R @ pads.moves[rows, fingers], R @ pads.turns[rows, fingers]
-    return Touching(gap, angle, n, pad, centre, rho, z, moves, turns)
-
-
-def _foot(surface: SurfaceOfRevolution, rho: Array, height: Array) -> tuple[Array, Array, Array]:
-    """Height, radius and slope of the nearest place on the meridian, three Newton steps."""
-    low, high = surface.profile.z_range
-    z = height
-    for _ in range(3):
-        r, dr, _ = surface.profile.derivatives(np.clip(z, low, high))
-        z = height + np.clip((rho - r) * dr / (1.0 + dr**2), -0.02, 0.02)
-    r, dr, _ = surface.profile.derivatives(np.clip(z, low, high))
-    return z, r, dr
-
-
-def _step(at: Touching, z_range: tuple[float, float], cone: float) -> Array:
-    """Joints, translation and rotation about the pads' middle, (N, nq + 6)."""
-    count, m, _, nq = at.moves.shape
-    arm = at.centre - at.centre.mean(axis=1, keepdims=True)
-    move = np.concatenate([at.moves, np.zeros((count, m, 3, 6))], axis=-1)
-    move[..., nq : nq + 3] = np.eye(3)
-    move[..., nq + 3 :] = -_skew(arm)
-    turn = np.concatenate([at.turns, np.zeros((count, m, 3, 6))], axis=-1)
-    turn[..., nq + 3 :] = np.eye(3)
-    around = unit(cross(np.broadcast_to([0.0, 0.0, 1.0], at.n.shape), at.n))
-    swing = np.einsum("nmi,nmip->nmp", around, move) / at.rho[..., None]
-    normal_move = around[..., None] * swing[..., None, :]  # n turns with the pad's meridian
-    residual = np.zeros((count, m, 5))
-    jacobian = np.zeros((count, m, 5, nq + 6))
-    residual[..., 0] = at.gap / GAP_UNIT
-    jacobian[..., 0, :] = np.einsum("nmi,nmip->nmp", at.n, move) / GAP_UNIT
-    excess = np.maximum(at.angle - cone, 0.0) / np.maximum(at.angle, 1e-6) / ANGLE_UNIT
-    residual[..., 1:4] = excess[..., None] * cross(at.n, at.pad)
-    jacobian[..., 1:4, :] = (excess > 0)[..., None, None] * (
-        _skew(at.n) @ -_skew(at.pad) @ turn - _skew(at.pad) @ normal_move
-    )
-    jacobian[..., 1:4, :] /= ANGLE_UNIT
-    beyond = at.z - np.clip(at.z, *inset(z_range))
-    residual[..., 4] = beyond / HEIGHT_UNIT
-    jacobian[..., 4, :] = (beyond != 0.0)[..., None] * move[..., 2, :] / HEIGHT_UNIT
-    willing = np.concatenate([np.full(nq, JOINT_UNIT), BASE_UNIT])
-    scaled = (jacobian * willing).reshape(count, 5 * m, nq + 6)
-    system = scaled @ np.swapaxes(scaled, 1, 2) + np.eye(5 * m)  # the small, dual form
-    dual = np.linalg.solve(system, residual.reshape(count, 5 * m, 1))
-    step = -(np.swapaxes(scaled, 1, 2) @ dual)[..., 0] * willing
-    limits = np.concatenate([np.full(nq, LONGEST[1]), np.repeat(LONGEST, 3)])
-    return np.asarray(step / np.maximum(np.max(np.abs(step) / limits, axis=1), 1.0)[:, None])
-
-
-def _moved(hand: Hand, poses: Poses, step: Array, at: Touching) -> Poses:
-    nq = poses.q.shape[1]
-    turn = _rotations(step[:, nq + 3 :])
-    middle = at.centre.mean(axis=1)
-    p = middle + np.einsum("nij,nj->ni", turn, poses.p - middle) + step[:, nq : nq + 3]
-    q = np.clip(poses.q + step[:, :nq], hand.lower, hand.upper)
-    return Poses(q, turn @ poses.R, p)
+    q, R, p = (np.array(x, dtype=float) for x in (poses.q, poses.R, poses.p))
+    places = np.zeros((*fingers.shape, 4))
+    ends = np.array(inset(surface.profile.z_range))
+    rest(
+        chains_of(hand), meridian_of(surface.profile), ends, _WITHIN * cone, iterations,
+        np.asarray(fingers, dtype=np.intp), q, R, p, places,
+    )  # fmt: skip
+    return Laid(q, R, p, *np.moveaxis(places, -1, 0))
 
 
 def opening_poses(
@@ -199,17 +111,3 @@ def inset(z_range: tuple[float, float]) -> tuple[float, float]:
     """Heights a tenth within both ends."""
     low, high = z_range
     return low + 0.1 * (high - low), high - 0.1 * (high - low)
-
-
-def _skew(v: Array) -> Array:
-    out = np.zeros((*v.shape, 3))
-    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
-    out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = v[..., 2], -v[..., 1], v[..., 0]
-    return out
-
-
-def _rotations(w: Array) -> Array:
-    """Rodrigues' formula for rotation vectors (N, 3)."""
-    angle = np.linalg.norm(w, axis=1)[:, None, None]
-    k = _skew(unit(np.where(angle[:, :, 0] > 1e-12, w, [1.0, 0.0, 0.0])))
-    return np.asarray(np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * k @ k)

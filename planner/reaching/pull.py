@@ -2,41 +2,55 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import pinocchio as pin
 
 from estimator.vectors import Array
+from hand_models.chains import chains_of
 from hand_models.hand import Finger, Hand
+from planner.kinematics.pulling import pull
 
-_DAMPING = 1e-6  # [m^2]
 _ITERATIONS = 8
-_CLOSE = 1e-7  # [m]
+
+
+@dataclass(frozen=True, eq=False)
+class Pulled:
+    """K configurations and where the finger's pad is there.
+
+    Args:
+        path: (K, nq).
+        centres, normals: Of the pad in the world, (K, 3) [m], unit.
+    """
+
+    path: Array
+    centres: Array
+    normals: Array
 
 
 def pulled(
     hand: Hand,
     finger: Finger,
     X_WB: pin.SE3,
-    q: Array,
-    target: Array,
+    path: Array,
+    targets: Array,
     *,
     iterations: int = _ITERATIONS,
-) -> Array:
-    """A configuration with the pad's centre at the target, or as near as limits and steps allow.
+    marching: bool = False,
+) -> Pulled:
+    """Configurations with the pad's centre at the targets, or as near as limits and steps allow.
 
     Args:
-        q: Where to start, (nq,); only the finger's own joints move, within their limits.
-        target: In the world, (3,) [m].
-        iterations: At most so many.
+        path: Where each starts, (K, nq); only the finger's own joints move, within their limits.
+        targets: In the world, (K, 3) [m].
+        iterations: At most so many, each.
+        marching: Whether each starts where the one before it ended; only the first counts then.
     """
-    row, joints = hand.fingers.index(finger), finger.q_indices
-    q = q.copy()
-    for _ in range(iterations):
-        pose = hand.at(q, X_WB)
-        error = target - pose.pad_centres[row]
-        if np.linalg.norm(error) < _CLOSE:
-            break
-        J = pose.pad_jacobian(finger)[:, joints]
-        step = J.T @ np.linalg.solve(J @ J.T + _DAMPING * np.eye(3), error)
-        q[joints] = np.clip(q[joints] + step, hand.lower[joints], hand.upper[joints])
-    return q
+    path = np.array(path, dtype=np.float64)
+    local = np.ascontiguousarray((targets - X_WB.translation) @ X_WB.rotation)
+    centres, normals = np.zeros_like(local), np.zeros_like(local)
+    row, joints = hand.fingers.index(finger), np.asarray(finger.q_indices, dtype=np.intp)
+    pull(chains_of(hand), row, joints, path, local, iterations, marching, centres, normals)
+    R = X_WB.rotation.T
+    return Pulled(path, centres @ R + X_WB.translation, normals @ R)

@@ -18,19 +18,18 @@ from estimator.axis import Axis
 from estimator.profile import cylinder
 from estimator.surface import SurfaceOfRevolution
 from estimator.vectors import Array, Index, Mask
-from hand_models.batch import batch_placements
 from hand_models.cache import cached_arrays, hand_fingerprint
 from hand_models.collision import HandCollision
 from hand_models.hand import Hand
 from hand_models.postures import Postures
 from hand_models.spheres import LinkSpheres
+from planner.reaching.clear import clear_of
 from planner.reaching.laying import Laid, Poses, inset, lay, opening_poses
 
 SMALLEST, RATIO, CLASSES = 0.008, 1.25, 14  # radii of the cylinders: 8 to 145 mm [m], [-]
 HEIGHT = 0.16  # of the cylinders [m]
 LAID = 2400  # postures that are laid onto each
 GAP = 1e-3  # of a laid pad from the cylinder [m]
-INTRUSION = 4e-3  # of a link sphere into it [m]
 
 _VERSION = 2  # of all this; part of the cache's key
 _HALF_TURN = np.diag([1.0, -1.0, -1.0])
@@ -128,15 +127,12 @@ class ReachMap:
 
         Beyond them the object may end: whether it does is the plan's to see.
         """
-        local = self.spheres.positions(batch_placements(self.hand, laid.q[rows]))
-        centres = np.einsum("nij,nmj->nmi", laid.R_OB[rows], local) + laid.p_OB[rows][:, None]
         z = laid.z[rows]
-        between = (centres[..., 2] > z.min(axis=1)[:, None]) & (
-            centres[..., 2] < z.max(axis=1)[:, None]
-        )
-        clearance = surface.signed_distance(centres) - self.spheres.radii
-        allowed = np.where(self.spheres.finger_indices >= 0, -2.0 * INTRUSION, -INTRUSION)
-        return np.asarray(np.all(~between | (clearance > allowed), axis=1))
+        between = np.stack([z.min(axis=1), z.max(axis=1)], axis=1)
+        return clear_of(
+            self.hand, self.spheres, surface.profile, laid.q[rows], laid.R_OB[rows],
+            laid.p_OB[rows], between=between,
+        )  # fmt: skip
 
 
 def _cylinder(radius_class: int) -> SurfaceOfRevolution:

@@ -41,7 +41,7 @@ from planner.reaching.solid import PARAMETERS, RevolvedSolid, signed_distance
 Array = NDArray[np.float64]
 
 _RETREATED = (0.5, 1.0)  # shares of an arm's retreat at which the hand is kept out of the object
-_BESIDE_PAD = 1e-4  # of what is fixed to a touching pad from the object: hulls stand out [m]
+BESIDE_PAD = 1e-4  # of what is fixed to a touching pad from the object: hulls stand out [m]
 _CENTRAL = 0.25  # of the way from the start to mid-range: where the joints rest
 _TURN_WEIGHT = 0.05
 _KNOT_WEIGHT = 0.1  # stand-off and overshoot postures need not be near
@@ -183,7 +183,7 @@ class ReachModel:
         nearest = ca.fmin(distance, table).T
         # What is fixed to a touching pad cannot keep the distance, only out of the object.
         apart = ~np.isin(spheres.finger_indices[kept], self.fingers)
-        asked = ca.if_else(ca.DM(apart.astype(float)), p.clearance, _BESIDE_PAD)
+        asked = ca.if_else(ca.DM(apart.astype(float)), p.clearance, BESIDE_PAD)
         asked *= ca.DM((~spheres.is_pad[kept]).astype(float) + (spheres.is_pad[kept] & apart))
         return (nearest - spheres.radii[kept] - asked) / LENGTH
 

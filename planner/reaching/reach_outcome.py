@@ -29,7 +29,7 @@ class Reach:
         points, normals: (k, 3) the contacts.
         certificate: Of q; position residual, pad angle, limits, clearances.
         before: At the stand-off, its residuals against the stand-off points.
-        solver: "sqp" or "ipopt".
+        solver: "newton", "sqp" or "ipopt".
         tried: Number of starts tried, this one included.
     """
 

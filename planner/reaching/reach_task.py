@@ -20,11 +20,11 @@ from planner.reaching.workspace import Workspace
 
 Array = NDArray[np.float64]
 
-_HULL_MARGIN = 1e-3  # asked of the spheres on top, as hulls stand out of them [m]
+HULL_MARGIN = 1e-3  # asked of the spheres on top, as hulls stand out of them [m]
 _FREE_TRAVEL = 0.15  # of a free base from its start [m]
 _FREE_TURN = 0.6  # bound on each modified Rodrigues parameter of it
 _PULLS = 3  # steps of a guess off the contact
-_NO_TABLE = (0.0, 0.0, 1.0, -1e3)
+NO_TABLE = (0.0, 0.0, 1.0, -1e3)
 
 
 _FREE = Workspace()
@@ -47,6 +47,7 @@ class ReachOptions:
         overshoot: How far behind the contact they can press on, if they can [m].
         least_overshoot: How far they must [m].
         starts: Library starts that are tried.
+        refined: Starts that the SQP tries when Gauss-Newton fails.
         rescues: Starts that Ipopt tries when the SQP fails.
         position_tolerance: Largest residual of a pad's place [m].
         pad_depth: How deep a pad may be in the object beside its contact, where it is hollow [m].
@@ -64,6 +65,7 @@ class ReachOptions:
     overshoot: float = 0.025
     least_overshoot: float = 0.012
     starts: int = 16
+    refined: int = 16
     rescues: int = 1
     position_tolerance: float = 1e-4
     pad_depth: float = 1e-3
@@ -75,8 +77,8 @@ class ReachOptions:
         for name in ("standoff", "overshoot"):
             if not 0.0 <= getattr(self, f"least_{name}") <= getattr(self, name):
                 raise ValueError(f"least_{name} must be in [0, {name}]")
-        if self.starts < 0 or self.rescues < 0:
-            raise ValueError("starts and rescues must be >= 0")
+        if min(self.starts, self.refined, self.rescues) < 0:
+            raise ValueError("starts, refined and rescues must be >= 0")
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,9 +169,9 @@ def _parameters(
         start=start.X_WB,
         nominal=start.X_WB if free else workspace.X_WB,
         cosines=(least_cosine, np.cos(options.cone), np.cos(options.off_contact_cone)),
-        clearance=options.clearance + _HULL_MARGIN,
+        clearance=options.clearance + HULL_MARGIN,
         retreat=task.retreat,
-        table=np.array(_NO_TABLE if options.table is None else options.table),
+        table=np.array(NO_TABLE if options.table is None else options.table),
         solid=task.solid,
         q_start=start.q,
     )
@@ -191,7 +193,7 @@ def _moved(model: ReachModel, task: ReachTask, start: Start, away: float) -> Arr
     for name, p, n in zip(start.fingers, task.points, task.normals, strict=True):
         finger = model.hand.finger(name)
         target = p + (finger.pad_radius + away) * n
-        q = pulled(model.hand, finger, start.X_WB, q, target, iterations=_PULLS)
+        (q,) = pulled(model.hand, finger, start.X_WB, q[None], target[None], iterations=_PULLS).path
     return np.asarray(q[list(model.shape.moving)])
 
 

@@ -1,0 +1,1 @@
+"""Compiled loops over thousands of postures: kinematics, laying onto a surface, clearance."""

@@ -1,0 +1,93 @@
+"""Joint frames and pads of one posture, inside compiled loops."""
+
+from __future__ import annotations
+
+from math import cos, sin
+
+from estimator.compiled import compiled
+from estimator.vectors import Array
+from hand_models.chains import Chains
+
+
+@compiled
+def place_joints(chains: Chains, q: Array, R: Array, p: Array) -> None:
+    """Rotations (J, 3, 3) and positions (J, 3) of all joints in the hand base frame."""
+    for j in range(len(chains.parents)):
+        if j == 0:
+            for i in range(3):
+                p[0, i] = 0.0
+                for k in range(3):
+                    R[0, i, k] = 1.0 if i == k else 0.0
+            continue
+        _place(chains, q, j, R, p)
+
+
+@compiled
+def _place(chains: Chains, q: Array, j: int, R: Array, p: Array) -> None:
+    """One joint whose parent is in place: fixed pose, then Rodrigues' formula and the slide."""
+    parent, w = chains.parents[j], chains.angular[j]
+    at = chains.multipliers[j] * q[chains.q_indices[j]] + chains.offsets[j]
+    s, c, square = sin(at), cos(at), w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
+    for i in range(3):
+        row = R[parent, i]
+        f0 = _times(row, chains.rotations[j], 0)
+        f1 = _times(row, chains.rotations[j], 1)
+        f2 = _times(row, chains.rotations[j], 2)
+        p[j, i] = p[parent, i]
+        for k in range(3):
+            p[j, i] += row[k] * chains.positions[j, k]
+        slide = f0 * chains.linear[j, 0] + f1 * chains.linear[j, 1] + f2 * chains.linear[j, 2]
+        p[j, i] += at * slide
+        along = f0 * w[0] + f1 * w[1] + f2 * w[2]
+        keep = 1.0 - (1.0 - c) * square
+        R[j, i, 0] = keep * f0 + (1.0 - c) * along * w[0] + s * (f1 * w[2] - f2 * w[1])
+        R[j, i, 1] = keep * f1 + (1.0 - c) * along * w[1] + s * (f2 * w[0] - f0 * w[2])
+        R[j, i, 2] = keep * f2 + (1.0 - c) * along * w[2] + s * (f0 * w[1] - f1 * w[0])
+
+
+@compiled
+def _times(row: Array, matrix: Array, column: int) -> float:
+    total = 0.0
+    for k in range(3):
+        total += row[k] * matrix[k, column]
+    return total
+
+
+@compiled
+def place_pad(
+    chains: Chains, finger: int, R: Array, p: Array, centre: Array, normal: Array
+) -> None:
+    """A pad's centre and normal (3,) in the hand base frame, its joints being in place."""
+    j = chains.pad_joints[finger]
+    for i in range(3):
+        centre[i], normal[i] = p[j, i], 0.0
+        for k in range(3):
+            centre[i] += R[j, i, k] * chains.pad_centres[finger, k]
+            normal[i] += R[j, i, k] * chains.pad_normals[finger, k]
+
+
+@compiled
+def pad_jacobian(
+    chains: Chains, finger: int, R: Array, p: Array, centre: Array, moves: Array, turns: Array
+) -> None:
+    """d centre / d q and the pad's angular velocity per joint velocity, both (3, nq)."""
+    moves[:], turns[:] = 0.0, 0.0
+    for j in chains.supports[finger]:
+        if j < 0:
+            break
+        q, times = chains.q_indices[j], chains.multipliers[j]
+        w0, w1, w2 = 0.0, 0.0, 0.0
+        for k in range(3):
+            w0 += times * R[j, 0, k] * chains.angular[j, k]
+            w1 += times * R[j, 1, k] * chains.angular[j, k]
+            w2 += times * R[j, 2, k] * chains.angular[j, k]
+        a0, a1, a2 = centre[0] - p[j, 0], centre[1] - p[j, 1], centre[2] - p[j, 2]
+        turns[0, q] += w0
+        turns[1, q] += w1
+        turns[2, q] += w2
+        moves[0, q] += w1 * a2 - w2 * a1
+        moves[1, q] += w2 * a0 - w0 * a2
+        moves[2, q] += w0 * a1 - w1 * a0
+        for i in range(3):
+            for k in range(3):
+                moves[i, q] += times * R[j, i, k] * chains.linear[j, k]
