@@ -9,6 +9,7 @@ the prior's type.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -37,7 +38,7 @@ class ProfileBand:
     covariance: Array
     by_axis: Array | None = None
 
-    @property
+    @cached_property
     def profile(self) -> SplineProfile:
         """The mean, as a profile."""
         return SplineProfile(self.z, np.maximum(self.mean, 0.2 * np.max(self.mean)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -51,7 +52,7 @@ class Belief:
         """Of the likeliest axis, in the chart at itself."""
         return self.hypotheses[0].covariance
 
-    @property
+    @cached_property
     def surface(self) -> SurfaceOfRevolution:
         """The best guess."""
         return SurfaceOfRevolution(self.axis, self.band.profile)

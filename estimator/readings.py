@@ -131,7 +131,8 @@ def stacked_readings(
         together: Whether contacts of doubtful direction are also judged together.
     """
     out = np.zeros((*kappa_read.shape[:2], COLUMNS))
-    table = np.array([_summary(s) for s in noise], dtype=np.float64).reshape(len(noise), 8)
+    known = {s: _summary(s) for s in set(noise)}
+    table = np.array([known[s] for s in noise], dtype=np.float64).reshape(len(noise), 8)
     out[..., EDGE] = edge = table[:, 0]
     out[..., SD_POSITION:COVARIANCE] = table[:, 1:]
     unmeasured = np.isinf(edge)
@@ -185,15 +186,16 @@ def _fill_covariances(
     Sigma: Array, noise: Sequence[SensorNoise], measured: Mapping[int, Array], unmeasured: Mask
 ) -> None:
     """What each contact was told, else independent errors of the sizes its sensor states."""
-    for i, s in enumerate(noise):
-        if i in measured:
-            Sigma[:, i] = _HALVED @ measured[i] @ _HALVED.T
-        else:
-            tensor = [max(s.mean_curvature, LEAST), *[max(s.deviator, LEAST)] * 2]
-            sds = [*[s.position] * 3, *[s.normal] * 2, *tensor]
-            Sigma[:, i] = np.diag(np.square(sds))
-        if unmeasured[i]:
-            Sigma[:, i, _MEAN:] = Sigma[:, i, :, _MEAN:] = 0.0
+    told = np.array([i in measured for i in range(len(noise))], dtype=bool)
+    for s in set(noise):
+        tensor = [max(s.mean_curvature, LEAST), *[max(s.deviator, LEAST)] * 2]
+        sds = [*[s.position] * 3, *[s.normal] * 2, *tensor]
+        alike = np.array([other == s for other in noise], dtype=bool)
+        Sigma[:, alike & ~told] = np.diag(np.square(sds))
+    for i, covariance in measured.items():
+        Sigma[:, i] = _HALVED @ covariance @ _HALVED.T
+    Sigma[:, unmeasured, _MEAN:] = 0.0
+    Sigma[:, unmeasured, :, _MEAN:] = 0.0
 
 
 def _void(half: Array, sd: Array, *, together: bool) -> Mask:

@@ -15,6 +15,7 @@ from estimator.singular import PlacedTriples
 from estimator.surface import Geometry
 from estimator.vectors import Array, Mask
 from planner.choosing.sampled_surfaces import SampledSurfaces
+from planner.kinematics.meeting import fill_met
 
 BEFORE, BEHIND = 0.030, 0.025  # how far an approach goes, about the expected contact [m]
 STEPS = 6
@@ -53,10 +54,8 @@ def prospects(samples: SampledObjects, p_W: Array, n_W: Array) -> Prospects:
         p_W, n_W: Expected contacts and outward normals, (N, m, 3) [m], unit.
     """
     B, (N, m) = len(samples.points), p_W.shape[:2]
-    p = np.broadcast_to(p_W.reshape(1, -1, 3), (B, N * m, 3))
-    n = np.broadcast_to(n_W.reshape(1, -1, 3), (B, N * m, 3))
     surfaces = SampledSurfaces(samples)
-    s, theta, off_wall, z = _met(surfaces, p, n)
+    s, theta, off_wall, z = _met(surfaces, p_W.reshape(-1, 3), n_W.reshape(-1, 3))
     low, high = surfaces.profiles.z_range
     inset = RIM * (high - low)
     inside = np.clip(z, low, high)
@@ -71,21 +70,15 @@ def prospects(samples: SampledObjects, p_W: Array, n_W: Array) -> Prospects:
 
 
 def _met(surfaces: SampledSurfaces, p: Array, n: Array) -> tuple[Array, Array, Array, Array]:
-    """Where lines p - s n (B, M) meet the walls: s, meridian angle, what is left, height.
-
-    Newton's steps along the line; on a wall that leans away they are kept short.
-    """
-    low, high = surfaces.profiles.z_range
-    across = n @ np.swapaxes(surfaces.frames, 1, 2)
-    s = np.zeros(p.shape[:2])
-    for _ in range(STEPS):
-        theta, rho, z = surfaces.cylindrical(p - s[..., None] * n)
-        r, dr, _ = surfaces.profiles.derivatives(np.clip(z, low, high))
-        outward = across[..., 0] * np.cos(theta) + across[..., 1] * np.sin(theta)
-        slope = -outward + dr * across[..., 2]
-        s = np.clip(s - (rho - r) / np.minimum(slope, -0.2), -1.5 * BEFORE, 1.5 * BEHIND)
-    theta, rho, z = surfaces.cylindrical(p - s[..., None] * n)
-    return s, theta, rho - surfaces.profiles.derivatives(np.clip(z, low, high))[0], z
+    """Where lines p - s n (M, 3) meet walls: s, meridian angle, what is left, height, (B, M)."""
+    objects, met = surfaces.objects, np.zeros((len(surfaces.objects.points), len(p), 4))
+    fill_met(
+        np.asarray(objects.z), surfaces.profiles.coefficients, np.asarray(objects.points),
+        surfaces.frames, np.ascontiguousarray(p), np.ascontiguousarray(n),
+        np.array([-1.5 * BEFORE, 1.5 * BEHIND]), STEPS, met,
+    )  # fmt: skip
+    s, theta, off_wall, z = np.moveaxis(met, -1, 0)
+    return s, theta, off_wall, z
 
 
 def with_earlier(landed: Prospects, samples: SampledObjects, p_W: Array) -> PlacedTriples | None:

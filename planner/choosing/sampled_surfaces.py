@@ -33,7 +33,7 @@ class SampledProfiles:
         return float(self.z[0]), float(self.z[-1])
 
     @cached_property
-    def _coefficients(self) -> Array:
+    def coefficients(self) -> Array:
         """Of t^3, t^2, t, 1 on each interval, (B, k - 1, 4)."""
         spline = CubicSpline(self.z, self.radii, axis=1, bc_type="natural")
         return np.ascontiguousarray(np.moveaxis(spline.c, (0, 1), (2, 1)))
@@ -41,7 +41,7 @@ class SampledProfiles:
     def derivatives(self, z: Array) -> tuple[Array, Array, Array]:
         """r, r', r'' at heights (B, N)."""
         at = np.clip(np.searchsorted(self.z, z, side="right") - 1, 0, len(self.z) - 2)
-        a, b, c, d = np.moveaxis(self._coefficients[np.arange(len(z))[:, None], at], -1, 0)
+        a, b, c, d = np.moveaxis(self.coefficients[np.arange(len(z))[:, None], at], -1, 0)
         t = z - self.z[at]
         r = ((a * t + b) * t + c) * t + d
         return r, (3.0 * a * t + 2.0 * b) * t + c, 6.0 * a * t + 2.0 * b
