@@ -38,7 +38,7 @@ MARGIN = 0.08  # from every singularity, in three of four sampled objects
 MISLABEL_COST = 4.0  # a wrong labelling is this much worse, as a logarithm of error
 MISS_COST = 1.0  # likewise a finger that misses, beside what it does not tell
 SINGULAR_COST = 2.0  # and touches within the margin
-SHORT_LIST = 20
+SHORT_LIST = 12  # candidates whose label odds are asked
 ODDS_OBJECTS = 2
 
 
