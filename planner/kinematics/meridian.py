@@ -13,7 +13,7 @@ from estimator.vectors import Array
 
 _PIECES = 128  # cubic ones: off a spline's radius by less than a micrometre
 _FOOT_STEPS = 3
-_FARTHEST = 0.02  # of a foot from its point, along the axis [m]
+_FARTHEST = 0.02  # step along the axis [m]
 
 
 class Meridian(NamedTuple):
@@ -51,8 +51,8 @@ def foot(meridian: Meridian, rho: float, height: float) -> tuple[float, float, f
     z = height
     for _ in range(_FOOT_STEPS):
         r, dr = radius_and_slope(meridian, z)
-        off = (rho - r) * dr / (1.0 + dr**2)
-        z = height + min(max(off, -_FARTHEST), _FARTHEST)
+        off = (z - height - (rho - r) * dr) / (1.0 + dr**2)
+        z -= min(max(off, -_FARTHEST), _FARTHEST)
     r, dr = radius_and_slope(meridian, z)
     return z, r, dr
 
