@@ -37,6 +37,7 @@ from grasp_report import belief_record, episode_of, print_round, raw_touches
 from obstacle_file import read_obstacles
 from output_files import require_writable, write_json
 from rich.console import Console
+from views import belief_by
 from worlds import build_world, pose_in, print_object, sensor_in
 
 from estimator.axis import angle_between, offset_at
@@ -54,7 +55,6 @@ from planner.messages import plan_document
 from planner.options import PlannerOptions
 from planner.plan import NoPlan, Probe
 from planner.reaching.workspace import Workspace
-from sim_sensor.camera import coarse_view
 from sim_sensor.objects import load_object
 from sim_sensor.viewer.view import write_page
 from sim_sensor.world import World
@@ -79,8 +79,11 @@ class Options:
     gel-poor. Raw signals, simulated and read: fearing-strain, gel-depth, taxel-array."""
     world: str = "own"
     """own, or MuJoCo with gel-depth pads, the object held (mujoco) or on a table (mujoco-table)."""
+    view: str = "pose"
+    """What is known before the first touch: a pose with its error, a depth camera's cloud of one
+    side, or nothing but a box around the object."""
     prior_angle_deg: float = 15.0
-    """How far the camera's axis is off in direction."""
+    """How far the axis of a pose is off in direction."""
     prior_offset_mm: float = 15.0
     """How far it is off in position, beside the object's middle."""
     goal_angle_deg: float = 3.0
@@ -162,7 +165,8 @@ def _scenario(options: Options) -> Scenario:
     hand = load_hand(options.hand)
     return Scenario(
         surface=surface,
-        belief=coarse_view(
+        belief=belief_by(
+            options.view,
             surface,
             angle=np.deg2rad(options.prior_angle_deg),
             offset=1e-3 * options.prior_offset_mm,

@@ -69,6 +69,13 @@ def test_a_goal_out_of_budget_ends_with_one_and_says_why(tmp_path):
     assert "budget spent: direction within" in result["reason"]
 
 
+@pytest.mark.parametrize("view", ["cloud", "box"])
+def test_the_main_job_starts_from_what_a_camera_sees(view, tmp_path):
+    done = script("plan_grasp", "--object", "bottle", "--view", view, "--out", tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert json.loads((tmp_path / "result.json").read_text())["error"]["angle_deg"] < 3.0
+
+
 def test_a_sphere_is_never_claimed_to_be_known(tmp_path):
     done = script("plan_grasp", "--object", "sphere", "--budget", 6, "--out", tmp_path)
     assert done.returncode == 1
@@ -90,6 +97,7 @@ def test_a_sphere_is_never_claimed_to_be_known(tmp_path):
         (("--budget", "0"), "--budget: expected at least one touch"),
         (("--prior-offset-mm", "1e300"), "--prior-offset-mm: expected 0 to 1000"),
         (("--seed", "-1"), "--seed: expected a number >= 0"),
+        (("--view", "guess"), "--view .guess. is unknown; known are pose, cloud, box"),
         (("--wrist-mm", "nan", "0", "0"), "--wrist-mm: expected three finite numbers"),
         (("--wrist-mm", "0", "0", "0", "--wrist-range-mm", "-5"), "position_range"),
     ],
