@@ -97,7 +97,7 @@ def test_a_sphere_is_never_claimed_to_be_known(tmp_path):
         (("--budget", "0"), "--budget: expected at least one touch"),
         (("--prior-offset-mm", "1e300"), "--prior-offset-mm: expected 0 to 1000"),
         (("--seed", "-1"), "--seed: expected a number >= 0"),
-        (("--view", "guess"), "--view .guess. is unknown; known are pose, cloud, box"),
+        (("--view", "guess"), "is unknown; known are pose, cloud, box"),
         (("--wrist-mm", "nan", "0", "0"), "--wrist-mm: expected three finite numbers"),
         (("--wrist-mm", "0", "0", "0", "--wrist-range-mm", "-5"), "position_range"),
     ],
