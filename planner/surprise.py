@@ -67,18 +67,23 @@ class Learnt:
 
     Args:
         belief: What is held true.
-        settled: Whether later touches agreed with earlier ones, after the last that did not: a goal
-            that is met by touches nothing confirmed does not count.
+        agreeing: Later touches that agreed with earlier ones, since the last that did not.
         surprise: What the last touches contradicted and what was done; None where nothing.
         surprises: How often that happened beyond doubt.
         restless: By how much every contact counts as worse placed [m].
     """
 
     belief: Belief
-    settled: bool = False
+    agreeing: int = 0
     surprise: str | None = None
     surprises: int = 0
     restless: float = 0.0
+
+    @property
+    def settled(self) -> bool:
+        """Whether enough touches agree: a goal met by touches that nothing confirmed does not
+        count, and of an object that moved once, twice, ... one, three, ... have to."""
+        return self.agreeing >= max(1, 2 * self.surprises - 1)
 
 
 def learn(known: Learnt, outcomes: Sequence[Contact | Miss]) -> Learnt:
@@ -87,8 +92,9 @@ def learn(known: Learnt, outcomes: Sequence[Contact | Miss]) -> Learnt:
     belief = update(known.belief, felt)
     motion = motion_between(known.belief, belief, felt)
     if motion is None or motion.p_value > (ONCE_BITTEN if known.surprises else ALARM):
-        settled = known.settled or (motion is not None and motion.p_value > AGREES)
-        return replace(known, belief=belief, settled=settled, surprise=None)
+        agree = motion is not None and motion.p_value > AGREES
+        agreeing = known.agreeing + agree * sum(isinstance(touch, Contact) for touch in felt)
+        return replace(known, belief=belief, agreeing=agreeing, surprise=None)
     surprises, restless = known.surprises + (motion.p_value <= ALARM), known.restless
     words = f"{motion.words}. Earlier contacts now count only as a wider prior"
     if surprises >= RESTLESS and motion.p_value <= ALARM:
@@ -96,7 +102,7 @@ def learn(known: Learnt, outcomes: Sequence[Contact | Miss]) -> Learnt:
         felt = tuple(_as_sure(touch, restless) for touch in outcomes)
         words = f"{words}; it keeps happening, so contacts count as {1e3 * restless:.0f} mm worse"
     belief = after_motion(known.belief, felt, motion)
-    return Learnt(belief, False, words, surprises, restless)
+    return Learnt(belief, 0, words, surprises, restless)
 
 
 def motion_between(before: Belief, after: Belief, later: Sequence[Contact | Miss]) -> Motion | None:

@@ -36,6 +36,7 @@ SPARE = 2e-4
 CLOSE = 1e-6  # largest violation: done [m]
 ARC = 0.05  # at which an angle counts as a violation [m]
 INSIDE = 0.97  # of the cone, where an angle beyond it goes
+HALF_TURN = 3.1  # beyond which a turn back has no direction [rad]
 REFREEZE = 3  # times that limits are asked for a step
 
 
@@ -54,6 +55,7 @@ class Demands(NamedTuple):
         columns: (K, nq) unknown that moves each joint at each knot; joints, base, then the others'.
         willing: (unknowns,) how willingly each moves.
         box: (2, 3) range of the base's position [m].
+        R_nominal, most_turn: The base turns from there by at most so much [rad].
     """
 
     fingers: Index
@@ -71,6 +73,8 @@ class Demands(NamedTuple):
     columns: Index
     willing: Array
     box: Array
+    R_nominal: Array
+    most_turn: float
 
 
 @compiled
@@ -336,6 +340,24 @@ def _take(
     rotation(step[nq + 3 : nq + 6], turn)
     arm, was = turn @ (p - middle), R.copy()
     R[:] = turn @ was
+    _turn_back(demands, R)
     for a in range(3):
         moved = middle[a] + arm[a] + step[nq + a]
         p[a] = min(max(moved, demands.box[0, a]), demands.box[1, a])
+
+
+@compiled
+def _turn_back(demands: Demands, R: Array) -> None:
+    """Onto the largest turn from nominal, where it is beyond."""
+    away = demands.R_nominal.T @ R
+    cosine = 0.5 * (away[0, 0] + away[1, 1] + away[2, 2] - 1.0)
+    angle = acos(min(max(cosine, -1.0), 1.0))
+    if angle <= demands.most_turn or angle > HALF_TURN:
+        return
+    w = np.zeros(3)
+    w[0], w[1] = away[2, 1] - away[1, 2], away[0, 2] - away[2, 0]
+    w[2] = away[1, 0] - away[0, 1]
+    w *= demands.most_turn / (2.0 * sin(angle))
+    turn = np.zeros((3, 3))
+    rotation(w, turn)
+    R[:] = demands.R_nominal @ turn

@@ -18,6 +18,7 @@ from planner.reaching.reach_task import ReachOptions, ReachTask, Solution
 Array = NDArray[np.float64]
 
 _RETREATED = (0.33, 0.67, 1.0)  # shares of an arm's retreat that are checked
+_OUT_OF_RANGE = 1e-5  # of the base [m]
 _PRESSED = (0.0, 0.25, 0.5, 0.75, 1.0)  # shares of a finger's overshoot that are checked
 
 
@@ -42,6 +43,7 @@ def inspect(hand: Hand, collision: HandCollision, task: ReachTask, found: Soluti
     allowed = _tolerances(options)
     at = _certificate(hand, collision, task, found, 0.0)
     before, said = at, list(faults(hand, at, found.q, fingers, allowed))
+    said.extend(_base_faults(options, found))
     wide = replace(allowed, cone=max(options.cone, options.off_contact_cone))
     by_arm = bool(np.any(found.retreat))
     shares = _RETREATED if by_arm else (1.0,) if np.any(found.standoff) else ()
@@ -54,6 +56,14 @@ def inspect(hand: Hand, collision: HandCollision, task: ReachTask, found: Soluti
     if not by_arm and np.any(found.overshoot):
         said.extend(_pressing_faults(hand, collision, options, found))
     return Inspection(at, before, tuple(said))
+
+
+def _base_faults(options: ReachOptions, found: Solution) -> Iterator[str]:
+    """A base that is not where the arm can hold it at the contact."""
+    X_WB = found.X_WB
+    out = float(options.workspace.violation(X_WB.rotation[None], X_WB.translation[None])[0])
+    if out > _OUT_OF_RANGE:
+        yield f"the hand base is {1e3 * out:.1f} mm beyond its workspace, a turn as its arc"
 
 
 def _tolerances(options: ReachOptions) -> Tolerances:

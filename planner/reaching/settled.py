@@ -97,6 +97,7 @@ def _settled(
         joints=np.asarray(spheres.joints), asked=_asked(hand, spheres, task, rows, knots),
         spheres=np.column_stack([spheres.centres, spheres.radii]),
         columns=knots.columns, willing=_willing(hand, task, knots), box=_box(task, start),
+        R_nominal=_nominal(task, R), most_turn=_most_turn(task),
     )  # fmt: skip
     np.clip(p, *demands.box, out=p)
     left = settle(chains, demands, q, R, p, ITERATIONS)
@@ -148,6 +149,16 @@ def _willing(hand: Hand, task: ReachTask, knots: _Knots) -> Array:
     out[nq : nq + 3] = BASE_UNITS[0] if free or workspace.position_range > 0.0 else 0.0
     out[nq + 3 : nq + 6] = BASE_UNITS[1] if free or workspace.rotation_range > 0.0 else 0.0
     return out
+
+
+def _nominal(task: ReachTask, R_start: Array) -> Array:
+    X_WB = task.options.workspace.X_WB
+    return np.array(R_start if X_WB is None else X_WB.rotation)
+
+
+def _most_turn(task: ReachTask) -> float:
+    workspace = task.options.workspace
+    return float(np.pi if workspace.X_WB is None else workspace.rotation_range)
 
 
 def _box(task: ReachTask, start: Start) -> Array:
