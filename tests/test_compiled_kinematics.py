@@ -16,6 +16,7 @@ from hand_models.chains import chains_of
 from hand_models.spheres import link_spheres
 from planner.choosing.prospects import prospects
 from planner.choosing.sampled_surfaces import SampledSurfaces
+from planner.hand_tools import hand_tools
 from planner.kinematics.meridian import (
     distance,
     distance_and_slopes,
@@ -26,6 +27,11 @@ from planner.kinematics.meridian import (
 from planner.kinematics.placing import pad_jacobian, place_joints, place_pad
 from planner.reaching.clear import clear_of
 from planner.reaching.pull import pulled
+from planner.reaching.reach_task import ReachOptions, ReachTask
+from planner.reaching.settled import settled
+from planner.reaching.solid import RevolvedSolid
+from planner.reaching.starts import Start
+from planner.reaching.workspace import Workspace
 
 HANDS = ("allegro_right", "psyonic_right", "trifinger_edu", "allegro_right_ur5")
 UPRIGHT = Axis(np.zeros(3), np.array([0.0, 0.0, 1.0]))
@@ -148,3 +154,56 @@ def test_approaches_meet_sampled_walls_where_a_bisection_does():
         for i in range(12):
             s = brentq(off_wall, -0.02, 0.02, args=(b, i), xtol=1e-12)
             np.testing.assert_allclose(landed.geometry.p[b, i], p[i] - s * n[i], atol=1e-8)
+
+
+@pytest.mark.parametrize("name", ["allegro_right", "trifinger_edu"])
+def test_settled_pads_are_at_contact_stand_off_and_overshoot(name):
+    """From a posture that nearly fits, by Pinocchio: places, cones, limits, one base for all."""
+    hand = load_hand(name)
+    solid = RevolvedSolid(pin.SE3.Identity(), np.linspace(-0.08, 0.08, 21), np.full(21, 0.03))
+    tools, options = hand_tools(hand, ReachOptions()), ReachOptions()
+    surface = SurfaceOfRevolution(UPRIGHT, cylinder(0.03, 0.16))
+    found = tools.candidates(surface, 3, count=60, rng=np.random.default_rng(0))
+    solved = 0
+    for i in range(min(len(found), 12)):
+        place = surface.at(found.theta[i], found.z[i])
+        names = tuple(hand.fingers[k].name for k in found.fingers[i])
+        task = ReachTask(place.p, place.n, solid, options)
+        start = Start(names, found.q[i], found.base(i))
+        got = settled(hand, tools.spheres, task, start, by_fingers=True)
+        if got.violation > 1e-4:
+            continue
+        solved += 1
+        for q, away in (
+            (got.q, 0.0),
+            (got.q_standoff, got.standoff),
+            (got.q_overshoot, -got.overshoot),
+        ):
+            assert np.all((q >= hand.lower) & (q <= hand.upper))
+            pose = hand.at(q, got.X_WB)
+            radii = np.array([hand.fingers[k].pad_radius for k in found.fingers[i]])
+            there = place.p + (radii + away)[:, None] * place.n
+            np.testing.assert_allclose(pose.pad_centres[found.fingers[i]], there, atol=3e-5)
+            facing = -np.sum(pose.pad_normals[found.fingers[i]] * place.n, axis=1)
+            cone = options.cone if np.all(away == 0.0) else options.off_contact_cone
+            assert np.all(facing > np.cos(cone + 1e-3))
+        assert np.all(got.standoff >= options.least_standoff)
+        assert np.all(got.overshoot >= options.least_overshoot)
+    assert solved >= 6
+
+
+def test_a_base_that_is_held_stays_where_it_may_be():
+    hand, rng = load_hand("allegro_right"), np.random.default_rng(0)
+    tools = hand_tools(hand, ReachOptions())
+    surface = SurfaceOfRevolution(UPRIGHT, cylinder(0.03, 0.16))
+    solid = RevolvedSolid(pin.SE3.Identity(), np.linspace(-0.08, 0.08, 21), np.full(21, 0.03))
+    found = tools.candidates(surface, 3, count=60, rng=rng)
+    for i in range(6):
+        nominal = found.base(i) * pin.SE3(pin.exp3(0.2 * rng.normal(size=3)), np.zeros(3))
+        workspace = Workspace(nominal, 0.01, 0.15)
+        place = surface.at(found.theta[i], found.z[i])
+        task = ReachTask(place.p, place.n, solid, ReachOptions(workspace=workspace))
+        names = tuple(hand.fingers[k].name for k in found.fingers[i])
+        start = Start(names, found.q[i], found.base(i))
+        X_WB = settled(hand, tools.spheres, task, start, by_fingers=False).X_WB
+        assert workspace.violation(X_WB.rotation[None], X_WB.translation[None])[0] < 1e-6

@@ -7,6 +7,7 @@ from math import cos, sin
 from estimator.compiled import compiled
 from estimator.vectors import Array
 from hand_models.chains import Chains
+from planner.kinematics.small import clear
 
 
 @compiled
@@ -71,7 +72,8 @@ def pad_jacobian(
     chains: Chains, finger: int, R: Array, p: Array, centre: Array, moves: Array, turns: Array
 ) -> None:
     """d centre / d q and the pad's angular velocity per joint velocity, both (3, nq)."""
-    moves[:], turns[:] = 0.0, 0.0
+    clear(moves)
+    clear(turns)
     for j in chains.supports[finger]:
         if j < 0:
             break

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from estimator.compiled import compiled
-from estimator.linear import factor, solve_factored
 from estimator.vectors import Array, Index
 from hand_models.chains import Chains
 from planner.kinematics.placing import pad_jacobian, place_joints, place_pad
+from planner.kinematics.small import solve_leading
 
 DAMPING = 1e-6  # [m^2]
 CLOSE = 1e-7  # [m]
@@ -34,12 +34,16 @@ def pull(
     system, lower, error = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3)
     for k in range(len(path)):
         if marching and k > 0:
-            path[k] = path[k - 1]
+            for c in range(nq):
+                path[k, c] = path[k - 1, c]
         for turn in range(iterations + 1):
             place_joints(chains, path[k], R, p)
             place_pad(chains, finger, R, p, centres[k], normals[k])
-            error[:] = targets[k] - centres[k]
-            if turn == iterations or np.sqrt(np.sum(error**2)) < CLOSE:
+            square = 0.0
+            for a in range(3):
+                error[a] = targets[k, a] - centres[k, a]
+                square += error[a] ** 2
+            if turn == iterations or square < CLOSE**2:
                 break
             pad_jacobian(chains, finger, R, p, centres[k], moves, turns)
             for a in range(3):
@@ -47,8 +51,7 @@ def pull(
                     system[a, b] = DAMPING if a == b else 0.0
                     for c in joints:
                         system[a, b] += moves[a, c] * moves[b, c]
-            factor(system, lower)
-            solve_factored(lower, error)
+            solve_leading(system, lower, error, 3)
             for c in joints:
                 step = moves[0, c] * error[0] + moves[1, c] * error[1] + moves[2, c] * error[2]
                 path[k, c] = min(max(path[k, c] + step, chains.lower[c]), chains.upper[c])

@@ -16,11 +16,11 @@ from math import acos, atan2, hypot, sqrt
 import numpy as np
 
 from estimator.compiled import compiled
-from estimator.linear import factor, solve_factored
 from estimator.vectors import Array, Index
 from hand_models.chains import Chains
 from planner.kinematics.meridian import Meridian, foot
 from planner.kinematics.placing import pad_jacobian, place_joints, place_pad
+from planner.kinematics.small import clear, solve_leading, turn_by, turned
 
 GAP_UNIT = 0.3e-3  # so far off the surface weighs as much as ...
 ANGLE_UNIT = 0.2  # ... this much of pad angle beyond the cone [rad]
@@ -97,13 +97,16 @@ def _residuals(
 ) -> None:  # fmt: skip
     """Residuals and their rows in joints, base position and turn about the pads' middle."""
     m, nq = len(fingers), jacobians.shape[3]
-    middle, move, spin = np.zeros(3), np.zeros((3, nq + 6)), np.zeros((3, nq + 6))
+    middle, arm = np.zeros(3), np.zeros(3)
+    move, spin = np.zeros((3, nq + 6)), np.zeros((3, nq + 6))
     for k in range(m):
         for a in range(3):
             middle[a] += pads[k, 0, a] / m
     for k in range(m):
         centre, pad = pads[k, 0], pads[k, 1]
-        _motions(centre - middle, jacobians[k], move, spin)
+        for a in range(3):
+            arm[a] = centre[a] - middle[a]
+        _motions(arm, jacobians[k], move, spin)
         rho = max(hypot(centre[0], centre[1]), 1e-9)
         z, r, dr = foot(meridian, rho, centre[2])
         w = sqrt(1.0 + dr**2)
@@ -128,7 +131,8 @@ def _residuals(
 def _motions(arm: Array, jacobians: Array, move: Array, spin: Array) -> None:
     """How a pad's centre moves and turns with joints, base position and turn, (3, nq + 6)."""
     nq = jacobians.shape[2]
-    move[:], spin[:] = 0.0, 0.0
+    clear(move)
+    clear(spin)
     for a in range(3):
         for c in range(nq):
             move[a, c], spin[a, c] = jacobians[0, a, c], jacobians[1, a, c]
@@ -179,8 +183,7 @@ def _least_step(
             for c in range(nq + 6):
                 total += rows[k, c] * rows[j, c]
             system[k, j] = total
-    factor(system, lower)
-    solve_factored(lower, residual)
+    solve_leading(system, lower, residual, len(rows))
     longest = 1.0
     for c in range(nq + 6):
         total = 0.0
@@ -200,32 +203,12 @@ def _take(chains: Chains, step: Array, pads: Array, q: Array, R: Array, p: Array
     nq, m = len(q), len(pads)
     for c in range(nq):
         q[c] = min(max(q[c] + step[c], chains.lower[c]), chains.upper[c])
-    turn, middle, arm = np.zeros((3, 3)), np.zeros(3), np.zeros(3)
-    rotation(step[nq + 3 :], turn)
+    w0, w1, w2 = step[nq + 3], step[nq + 4], step[nq + 5]
+    turn_by(w0, w1, w2, R)
+    middle = np.zeros(3)
     for a in range(3):
         for k in range(m):
             middle[a] += pads[k, 0, a] / m
-        arm[a] = p[a] - middle[a]
-    was = R.copy()
+    arm = turned(w0, w1, w2, p[0] - middle[0], p[1] - middle[1], p[2] - middle[2])
     for a in range(3):
-        p[a] = middle[a] + step[nq + a]
-        for b in range(3):
-            p[a] += turn[a, b] * arm[b]
-            R[a, b] = turn[a, 0] * was[0, b] + turn[a, 1] * was[1, b] + turn[a, 2] * was[2, b]
-
-
-@compiled
-def rotation(w: Array, out: Array) -> None:
-    """Rodrigues' formula for a rotation vector."""
-    angle = sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2)
-    s = np.sin(angle) / angle if angle > 1e-12 else 1.0
-    c = (1.0 - np.cos(angle)) / angle**2 if angle > 1e-12 else 0.5
-    for a in range(3):
-        for b in range(3):
-            out[a, b] = c * w[a] * w[b] + (1.0 - c * angle**2 if a == b else 0.0)
-    out[0, 1] -= s * w[2]
-    out[0, 2] += s * w[1]
-    out[1, 0] += s * w[2]
-    out[1, 2] -= s * w[0]
-    out[2, 0] -= s * w[1]
-    out[2, 1] += s * w[0]
+        p[a] = middle[a] + arm[a] + step[nq + a]

@@ -16,8 +16,9 @@ from estimator.vectors import Array
 from hand_models.chains import chains_of
 from hand_models.hand import Hand
 from hand_models.spheres import LinkSpheres
+from planner.kinematics.demands import Demands
 from planner.kinematics.meridian import Meridian
-from planner.kinematics.settling import BASE_UNITS, Demands, settle
+from planner.kinematics.settling import BASE_UNITS, settle
 from planner.reaching.reach_kinematics import LENGTH
 from planner.reaching.reach_model import BESIDE_PAD
 from planner.reaching.reach_task import HULL_MARGIN, NO_TABLE, ReachTask, Solution
