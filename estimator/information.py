@@ -91,6 +91,33 @@ def predicted_covariance(information: Array, prior: Array, direction_offset: flo
     return np.asarray(np.linalg.inv(information + before)[..., :4, :4])
 
 
+def with_untold_rotation(total: Array, before: Array, untold: float) -> Array:
+    """Mean square errors of the axis if all directions are turned by what nobody was told of.
+
+    The estimator that knows of no such rotation takes its trace in the directions for a tilt, and
+    errs by b for each radian of it; contacts that wrap around cancel that:
+
+        E[x x^T] = K + untold^2 b b^T,   b = K c tau / d
+
+    with K the axis' block of the inverse, c the information between axis and rotation, d that of
+    the rotation and tau its share from before the touches: where a rotation was admitted, most of
+    it is found, and little biases.
+
+    Args:
+        total: Information with what was known before, (..., 5, 5).
+        before: The latter alone, (5, 5).
+        untold: Sd of the rotation beside what was admitted [rad].
+    Returns:
+        (..., 4, 4).
+    """
+    K = np.linalg.inv(total)[..., :4, :4]
+    if untold == 0.0:
+        return np.asarray(K)
+    share = before[4, 4] / total[..., 4, 4]
+    b = np.einsum("...ij,...j->...i", K, total[..., :4, 4]) * share[..., None]
+    return np.asarray(K + untold**2 * b[..., :, None] * b[..., None, :])
+
+
 @dataclass(frozen=True, eq=False)
 class Expected:
     """Sets of m exact contacts on known objects: places (P, m), axes (P, 3), (P, 3)."""

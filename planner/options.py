@@ -28,8 +28,8 @@ class PlannerOptions:
         placements: How many placements of the hand are fitted to the believed surface.
         objects: How many objects are drawn from the belief.
         tries: How many of the best placements are handed to the optimiser.
-        offset_guard: Common rotation of the directions that a plan is proof against, whether the
-            sensor admits one or not [rad]: contacts that wrap around cancel it.
+        offset_guard: Sd of a common rotation of the directions beside what the sensor admits, by
+            which the estimate would be biased [rad]: contacts that wrap around cancel it.
         criterion: By what placements are put in order: see `planner.choosing.criteria`.
         grasp_height: Where along the believed axis the offset counts, from its point: the place
             of the later grasp [m].

@@ -21,7 +21,7 @@ from planner.choosing.choice import Ranking, rank
 from planner.choosing.optimum import certificate, value_at
 from planner.choosing.risk import risks
 from planner.choosing.sweep import FROM, swept, with_swept
-from planner.choosing.worth import Worth, guarded
+from planner.choosing.worth import Worth
 from planner.funnel import Funnel
 from planner.goal import Goal
 from planner.hand_tools import HandTools, hand_tools
@@ -125,9 +125,7 @@ def _best_placement(
     if len(candidates) == 0:
         return funnel
     samples = sample_objects(belief, options.objects, rng=rng)
-    worth = Worth(
-        belief, samples, guarded(sensor, options.offset_guard), goal, options.grasp_height
-    )
+    worth = Worth(belief, samples, sensor, goal, options.grasp_height, untold=options.offset_guard)
     rank_all = partial(
         rank, belief=belief, samples=samples, noise=sensor, goal=goal,
         margin=options.margin, offset_guard=options.offset_guard, height=options.grasp_height,

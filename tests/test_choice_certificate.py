@@ -14,7 +14,7 @@ from planner.choosing.choice import rank
 from planner.choosing.optimum import best_touches, certificate, place_grid, refined
 from planner.choosing.prospects import prospects
 from planner.choosing.risk import AMBIGUOUS, MISSED, risks, risks_in_words
-from planner.choosing.worth import Worth, guarded
+from planner.choosing.worth import Worth
 from planner.goal import Goal
 
 GOAL = Goal(np.deg2rad(3.0), 2e-3)
@@ -30,7 +30,7 @@ def worth(seed, angle=12.0, offset=8e-3, z_range=(-0.06, 0.06), objects=12):
     )
     belief = coarse_belief(prior, z_range)
     samples = sample_objects(belief, objects, rng=rng)
-    return Worth(belief, samples, guarded(SENSORS["gel"], GUARD), GOAL)
+    return Worth(belief, samples, SENSORS["gel"], GOAL, untold=GUARD)
 
 
 def random_candidates(seed, count=80):

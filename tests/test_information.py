@@ -13,6 +13,7 @@ from estimator.information import (
     contact_information,
     label_log_odds,
     predicted_covariance,
+    with_untold_rotation,
 )
 from estimator.prior import coarse_prior
 from estimator.profile import barrel, cone, cylinder
@@ -119,3 +120,23 @@ def test_many_problems_at_once_are_the_same_as_one_by_one():
     together = label_log_odds(Expected(stacked, points, directions), noise, PRIOR)
     alone = [odds(barrel(0.033, 3.0, 0.1), places, noise, PRIOR) for places in sets]
     np.testing.assert_allclose(together, alone, rtol=0.02)
+
+
+def test_an_untold_rotation_biases_as_predicted():
+    """2000 least-squares readings of an estimator that does not know of the rotation it meets."""
+    rng = np.random.default_rng(0)
+    rows = rng.normal(size=(9, 5)) * [3.0, 3.0, 3.0, 3.0, 5.0]  # what nine readings tell
+    for admitted in (1e-6, 0.3):
+        before = np.diag([1.0, 1.0, 1.0, 1.0, admitted**-2])
+        total = before + rows.T @ rows
+        truth = np.column_stack([rng.normal(size=(20_000, 4)), np.zeros(20_000)])
+        truth[:, 4] = np.hypot(admitted, 0.2) * rng.normal(size=20_000)
+        seen = truth @ rows.T + rng.normal(size=(20_000, 9))
+        error = (seen @ rows @ np.linalg.inv(total) - truth)[:, :4]
+        expected = with_untold_rotation(total, before, 0.2)
+        scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
+        np.testing.assert_allclose(
+            error.T @ error / len(error) / scale, expected / scale, atol=0.04
+        )
+    none = with_untold_rotation(total, before, 0.0)
+    np.testing.assert_allclose(none, np.linalg.inv(total)[:4, :4], rtol=1e-12)

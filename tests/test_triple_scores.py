@@ -8,7 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from estimator.axis import Axis
-from estimator.information import contact_information, known_before, predicted_covariance
+from estimator.information import (
+    contact_information,
+    known_before,
+    predicted_covariance,
+    with_untold_rotation,
+)
 from estimator.prior import coarse_prior
 from estimator.profile import barrel
 from estimator.sensors import SENSORS
@@ -139,3 +144,22 @@ def test_what_does_not_fit_is_refused(change, message):
 def test_a_goal_of_zero_is_refused():
     with pytest.raises(ValueError, match="angle and offset > 0"):
         in_goals(BEFORE, angle=0.0, offset=OFFSET)
+
+
+@pytest.mark.parametrize("admitted", [0.0, COMMON])
+def test_an_untold_rotation_counts_as_it_biases(admitted):
+    """Against `with_untold_rotation`; contacts that wrap around suffer least."""
+    information = in_goals(grid(drawn_axes(3)), angle=ANGLE, offset=OFFSET)
+    before = in_goals(known_before(PRIOR.covariance, admitted), angle=ANGLE, offset=OFFSET)
+    triples = np.array(list(combinations(range(len(THETA)), 3)))
+    total = before + information[:, triples].sum(axis=2)
+    for untold in (0.0, COMMON):
+        after = with_untold_rotation(total, before, untold)
+        expected = 0.5 * np.log(np.einsum("btii->bt", after)).mean(axis=0)
+        got = triple_scores(information, before, triples, untold=untold)
+        np.testing.assert_allclose(got, expected, rtol=1e-9, atol=1e-9)
+    gain = got - triple_scores(information, before, triples)
+    around = [i for i, t in enumerate(triples) if tuple(t) == (0, 2, 4)]  # 0, 110, 230 deg
+    aside = [i for i, t in enumerate(triples) if tuple(t) == (0, 1, 2)]  # 0, 40, 110 deg
+    if admitted == 0.0:
+        assert gain[around] < 0.5 * gain[aside]

@@ -2,11 +2,11 @@
 
 The rule "three contacts about 90 degrees apart in meridian, never opposite, avoiding shared
 parallels and normals that meet on the axis" has three parts here. Singular triples are refused
-with a margin that holds for three in four objects drawn from the belief, and charged for the
-others. The corrected bound of eqs (64)-(72) for the best *pair* prefers pairs near 90 degrees. The
-third contact follows what it is worth: the expected error of the axis after the touches, the
-chance that a finger misses, and the odds that the labels come out right. Other criteria are for
-comparison (`planner.choosing.criteria`).
+with a margin that holds for three in four objects drawn from the belief. The corrected bound of
+eqs (64)-(72) for the best *pair* prefers pairs near 90 degrees. The third contact follows what it
+is worth: the expected error of the axis after the touches, a rotation of the directions that
+nobody was told of included, the chance that a finger misses, and the odds that the labels come out
+right. Other criteria are for comparison (`planner.choosing.criteria`).
 """
 
 from __future__ import annotations
@@ -31,13 +31,12 @@ from estimator.vectors import Array, Index
 from planner.candidates import Candidates
 from planner.choosing.criteria import REFUSING, Criterion, Merits, costs
 from planner.choosing.prospects import Prospects, prospects
-from planner.choosing.worth import Worth, doubtful_margins, guarded
+from planner.choosing.worth import Worth
 from planner.goal import Goal
 
 MARGIN = 0.08  # from every singularity, in three of four sampled objects
 MISLABEL_COST = 4.0  # a wrong labelling is this much worse, as a logarithm of error
 MISS_COST = 1.0  # likewise a finger that misses, beside what it does not tell
-SINGULAR_COST = 2.0  # and touches within the margin
 SHORT_LIST = 12  # candidates whose label odds are asked
 ODDS_OBJECTS = 2
 
@@ -98,25 +97,23 @@ def rank(
         samples: Objects drawn from the belief.
         margin: Smallest margin from a singularity; zero ranks all, and so do the criteria that
             refuse nothing.
-        offset_guard: Common rotation of the directions that the expected error reckons with beside
-            what the sensor admits [rad]; bound and predicted covariance are the sensor's own.
+        offset_guard: Sd of a common rotation of the directions that the expected error reckons
+            with beside what the sensor admits [rad]; bound and predicted covariance do not.
         height: Of the later grasp above the believed axis' point: where the offset counts [m].
         rng: For the criterion `random` only.
     """
-    worth = Worth(belief, samples, guarded(noise, offset_guard), goal, height)
+    worth = Worth(belief, samples, noise, goal, height, untold=offset_guard)
     place = belief.surface.at(candidates.theta, candidates.z)
     landed = prospects(samples, place.p, place.n)
     after = worth.covariances(landed)
     value, angle, offset = _expected_error(after)
     bound, best_bound = _pair_bound(candidates.theta, place, noise)
-    margins = worth.margins(landed)  # (B, N, K)
-    low = doubtful_margins(margins)
+    low = worth.least_margins(landed)
     margins_at, nearest = low.min(axis=1), _named(low)
     merits = Merits(candidates.theta, candidates.z, value, after, bound, best_bound, belief, goal)
     cost = costs(criterion, merits, rng)
     if criterion == "information":
         cost = cost + MISS_COST * np.mean(~landed.hit.all(axis=2), axis=0)
-        cost += SINGULAR_COST * np.mean(margins.min(axis=2) < margin, axis=0)
     least = margin if criterion in REFUSING else 0.0
     kept = np.nonzero(margins_at >= least)[0]
     order = kept[np.argsort(cost[kept], kind="stable")].astype(np.intp)

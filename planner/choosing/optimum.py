@@ -209,7 +209,7 @@ def _scores(worth: Worth, landed: Prospects, sets: Index) -> Array:
     nothing = np.zeros((len(each), 1, 5, 5))
     idle = np.full((len(sets), 3 - sets.shape[1]), each.shape[1], dtype=np.intp)
     information = np.concatenate([each, nothing], axis=1)
-    return triple_scores(information, worth.before, np.hstack([idle, sets]))
+    return triple_scores(information, worth.before, np.hstack([idle, sets]), untold=worth.untold)
 
 
 def _first_nonsingular(worth: Worth, landed: Prospects, sets: Index, margin: float) -> int | None:

@@ -77,7 +77,9 @@ def swept(
         triples = _triples(reached.finger, len(hand.fingers))
         own = information[:, first : first + len(reached.finger)]
         first, scored = first + len(reached.finger), scored + len(triples)
-        best = triples[_best(triple_scores(own, worth.before, triples), COLLIDING * KEPT)]
+        best = triples[
+            _best(triple_scores(own, worth.before, triples, untold=worth.untold), COLLIDING * KEPT)
+        ]
         made = _made(hand, postures, candidates, i, reached, best)
         free = clear_of_object(hand, spheres, surface, made.q, made.R_WB, made.p_WB)
         apart = (k for k in np.flatnonzero(free).tolist() if is_self_free(made.q[k]))

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from estimator.belief import Belief, SampledObjects
 from estimator.contact import SensorNoise
-from estimator.information import contact_information, known_before
+from estimator.information import contact_information, known_before, with_untold_rotation
 from estimator.singular import margins
 from estimator.triple_scores import in_goals
 from estimator.vectors import Array
@@ -23,9 +23,11 @@ class Worth:
     """The belief, objects drawn from it, the sensor and the goal.
 
     Args:
-        noise: Of the sensor, with the common rotation that the expected error reckons with.
+        noise: Of the sensor, as it is told.
         height: Of the place along the believed axis where the offset counts, the later grasp's
             [m], from the axis' point.
+        untold: Sd of a common rotation of the directions that the expected error reckons with
+            beside what the sensor admits [rad]: the estimator will not know of it.
     """
 
     belief: Belief
@@ -33,6 +35,7 @@ class Worth:
     noise: SensorNoise
     goal: Goal
     height: float = 0.0
+    untold: float = 0.0
 
     @property
     def before(self) -> Array:
@@ -46,9 +49,9 @@ class Worth:
         return self._scaled(each.reshape(B, N, m, 5, 5) * landed.hit[..., None, None])
 
     def covariances(self, landed: Prospects) -> Array:
-        """After the touches of each candidate on each object, in goals, (B, N, 4, 4)."""
+        """Mean square errors after each candidate on each object, in goals, (B, N, 4, 4)."""
         total = self.before + self.information(landed).sum(axis=2)
-        return np.asarray(np.linalg.inv(total)[..., :4, :4])
+        return with_untold_rotation(total, self.before, self.untold)
 
     def least_margins(self, landed: Prospects) -> Array:
         """Margin that three of four objects keep from each singularity, (N, K)."""
@@ -75,8 +78,3 @@ def doubtful_margins(margins: Array) -> Array:
     """Margins (B, N, K) that three of four objects keep, (N, K)."""
     quantile = np.quantile(margins, DOUBTFUL_OBJECTS, axis=0, method="lower")  # infinite ones stay
     return np.asarray(quantile)
-
-
-def guarded(noise: SensorNoise, offset: float) -> SensorNoise:
-    """The sensor with a common rotation of the directions beside what it admits [rad]."""
-    return replace(noise, direction_offset=float(np.hypot(noise.direction_offset, offset)))
