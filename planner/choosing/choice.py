@@ -4,9 +4,9 @@ The rule "three contacts about 90 degrees apart in meridian, never opposite, avo
 parallels and normals that meet on the axis" has three parts here. Singular triples are refused
 with a margin that holds for three in four objects drawn from the belief. The corrected bound of
 eqs (64)-(72) for the best *pair* prefers pairs near 90 degrees. The third contact follows what it
-is worth: the expected error of the axis after the touches, a rotation of the directions that
-nobody was told of included, the chance that a finger misses, and the odds that the labels come out
-right. Other criteria are for comparison (`planner.choosing.criteria`).
+is worth: the expected error of the axis after the touches, misses and a rotation of the directions
+that nobody was told of included, and the odds that the labels come out right. Other criteria are
+for comparison (`planner.choosing.criteria`).
 """
 
 from __future__ import annotations
@@ -36,7 +36,6 @@ from planner.goal import Goal
 
 MARGIN = 0.08  # from every singularity, in three of four sampled objects
 MISLABEL_COST = 4.0  # a wrong labelling is this much worse, as a logarithm of error
-MISS_COST = 1.0  # likewise a finger that misses, beside what it does not tell
 SHORT_LIST = 12  # candidates whose label odds are asked
 ODDS_OBJECTS = 2
 
@@ -112,8 +111,6 @@ def rank(
     margins_at, nearest = low.min(axis=1), _named(low)
     merits = Merits(candidates.theta, candidates.z, value, after, bound, best_bound, belief, goal)
     cost = costs(criterion, merits, rng)
-    if criterion == "information":
-        cost = cost + MISS_COST * np.mean(~landed.hit.all(axis=2), axis=0)
     least = margin if criterion in REFUSING else 0.0
     kept = np.nonzero(margins_at >= least)[0]
     order = kept[np.argsort(cost[kept], kind="stable")].astype(np.intp)
