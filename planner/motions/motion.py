@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 SPACING = 2e-3  # between waypoints, at most [m]
 FORCE_GOAL = 0.5  # a soft pad feels that, and hardly any object moves [N]
 ARM_STROKE = 0.03  # before and behind the contact, where the arm moves [m]
-_OFF_LINE = 8e-5  # of the pad's centre, where an overshoot ends [m]
+_OFF_LINE = 1e-4  # of the pad's centre, where an overshoot ends [m]
 _JUMP = 0.2  # of a joint between waypoints, likewise [rad]
 
 

@@ -12,7 +12,7 @@ from hand_models.chains import chains_of
 from hand_models.hand import Finger, Hand
 from planner.kinematics.pulling import pull
 
-_ITERATIONS = 8
+_ITERATIONS = 40
 
 
 @dataclass(frozen=True, eq=False)
