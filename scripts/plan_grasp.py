@@ -23,19 +23,17 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pinocchio as pin
 import tyro
 from describe_hand import Options as DescribeOptions
 from describe_hand import describe
 from grasp_ending import Ending, ending, ending_record, grip_of, print_ending
 from grasp_moves import act_motions, from_home, left_at
 from grasp_report import belief_record, episode_of, print_round, raw_touches
-from obstacle_file import read_obstacles
 from output_files import require_writable, write_json
+from plan_options import Options, grasp_options, planner_options, require_sane
 from rich.console import Console
 from views import belief_by
 from worlds import build_world, pose_in, print_object, sensor_in
@@ -50,11 +48,10 @@ from hand_models import HandError, load_hand
 from hand_models.hand import Hand
 from planner.explore import Step, explore
 from planner.goal import Goal
-from planner.grasping.grasp import Friction, GraspOptions
+from planner.grasping.grasp import GraspOptions
 from planner.messages import plan_document
 from planner.options import PlannerOptions
 from planner.plan import NoPlan, Probe
-from planner.reaching.workspace import Workspace
 from sim_sensor.objects import load_object
 from sim_sensor.viewer.view import write_page
 from sim_sensor.world import World
@@ -63,51 +60,7 @@ if TYPE_CHECKING:
     from sim_sensor.physics.mujoco_world import MujocoWorld
 
 
-@dataclass(frozen=True)
-class Options:
-    """Command line of plan_grasp.py."""
-
-    hand: str = "allegro_right"
-    """Hand: one of hand_models/hands, or the path of a description (.toml)."""
-    describe_hand: Path | None = None
-    """Instead of all this, propose a description of the hand in this URDF or MJCF, into --out."""
-    object: str = "can"
-    """What is touched: a built-in name (can, bottle, cone, cup, barrel, jar-lid, knob, vase, egg,
-    spindle, paper-lathe, sphere), a CSV file (r_mm,z_mm), a product's JSON or a mesh (stl, obj)."""
-    sensor: str = "gel"
-    """Tactile sensor. Readings with noise: ideal, fearing1988, robotworld, taxel, gel, gel-good,
-    gel-poor. Raw signals, simulated and read: fearing-strain, gel-depth, taxel-array."""
-    world: str = "own"
-    """own, or MuJoCo with gel-depth pads, the object held (mujoco) or on a table (mujoco-table)."""
-    view: str = "pose"
-    """What is known before the first touch: a pose with its error, a depth camera's cloud of one
-    side, or nothing but a box around the object."""
-    prior_angle_deg: float = 15.0
-    """How far the axis of a pose is off in direction."""
-    prior_offset_mm: float = 15.0
-    """How far it is off in position, beside the object's middle."""
-    goal_angle_deg: float = 3.0
-    """Stop when the direction is known within this with 95 % probability ..."""
-    goal_offset_mm: float = 2.0
-    """... and the position within this."""
-    wrist_mm: tuple[float, float, float] | None = None
-    """Where the arm holds the hand base, in the world; the object stands near (500, 0, 200).
-    Not given, the arm reaches everywhere."""
-    wrist_range_mm: float = 150.0
-    """How far from there, along each axis, the arm can go; it turns the hand any way."""
-    obstacles: Path | None = None
-    """A TOML file of a table and boxes that the hand must not meet (scripts/obstacle_file.py)."""
-    budget: int = 15
-    """Largest number of touches."""
-    grasp_heights_mm: tuple[float, float] | None = None
-    """Lowest and highest contact of the grasp, along the believed axis from the object's believed
-    middle. Not given, anywhere but the ends."""
-    friction: float = 0.5
-    """Coefficient of friction between fingertips and object."""
-    seed: int = 0
-    """Of everything random: the object's pose, the camera's error, the sensor's noise."""
-    out: Path = Path("out")
-    """Folder for plan.json, result.json and probes.html."""
+FIRST_TIME = "(the first time, compiling for a minute or two)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,14 +105,7 @@ def main() -> int:
 
 
 def _scenario(options: Options) -> Scenario:
-    if not (np.isfinite(options.prior_angle_deg) and 0 < options.prior_angle_deg < 90):
-        raise ValueError(f"--prior-angle-deg: expected 0 to 90, got {options.prior_angle_deg}")
-    if not 0 < options.prior_offset_mm <= 1000:
-        raise ValueError(f"--prior-offset-mm: expected 0 to 1000, got {options.prior_offset_mm}")
-    if options.budget < 1:
-        raise ValueError(f"--budget: expected at least one touch, got {options.budget}")
-    if options.seed < 0:
-        raise ValueError(f"--seed: expected a number >= 0, got {options.seed}")
+    require_sane(options)
     rng = np.random.default_rng(options.seed)
     surface = SurfaceOfRevolution(pose_in(options.world, rng), load_object(options.object))
     hand = load_hand(options.hand)
@@ -176,36 +122,8 @@ def _scenario(options: Options) -> Scenario:
         world=build_world(options.world, hand, surface, options.sensor, rng),
         hand=hand,
         goal=Goal(np.deg2rad(options.goal_angle_deg), 1e-3 * options.goal_offset_mm),
-        planner=from_home(hand, _planner_options(options)),
-        grasp=_grasp_options(options),
-    )
-
-
-def _planner_options(options: Options) -> PlannerOptions:
-    """The planner's defaults, within the arm's workspace, among the obstacles."""
-    reach = replace(PlannerOptions().reach, **read_obstacles(options.obstacles))
-    if options.wrist_mm is None:
-        return PlannerOptions(reach=reach)
-    if not np.all(np.isfinite(options.wrist_mm)):
-        raise ValueError(f"--wrist-mm: expected three finite numbers, got {options.wrist_mm}")
-    X_WB = pin.SE3(np.eye(3), 1e-3 * np.array(options.wrist_mm))
-    workspace = Workspace(X_WB, 1e-3 * options.wrist_range_mm, np.pi)
-    return PlannerOptions(reach=replace(reach, workspace=workspace))
-
-
-def _grasp_options(options: Options) -> GraspOptions:
-    """The defaults, within the arm's workspace, at the user's heights."""
-    heights = options.grasp_heights_mm
-    if heights is not None and not heights[0] < heights[1]:
-        raise ValueError(f"--grasp-heights-mm: expected low < high, got {heights}")
-    if not (np.isfinite(options.friction) and options.friction > 0.0):
-        raise ValueError(f"--friction: expected a number > 0, got {options.friction}")
-    default, told = GraspOptions(), _planner_options(options).reach
-    return replace(
-        default,
-        reach=replace(default.reach, workspace=told.workspace, table=told.table, boxes=told.boxes),
-        heights=None if heights is None else (1e-3 * heights[0], 1e-3 * heights[1]),
-        friction=Friction(options.friction),
+        planner=from_home(hand, planner_options(options)),
+        grasp=grasp_options(options),
     )
 
 
@@ -227,7 +145,7 @@ def _rounds(scenario: Scenario, options: Options, console: Console) -> Iterator[
         rng=np.random.default_rng([options.seed, 1]),
     )
     while True:
-        with console.status("planning and touching (the first time, compiling for a minute) ..."):
+        with console.status(f"planning and touching {FIRST_TIME} ..."):
             step = next(steps, None)
         if step is None:
             return
@@ -240,13 +158,7 @@ def _conclude(
     belief = steps[-1].after if steps else scenario.belief
     unconfirmed = steps[-1].surprise if steps else None
     met = scenario.goal.met_by(belief) and unconfirmed is None
-    surface = scenario.world.surface
-    truth = surface.axis
-    middle = truth.point + np.mean(surface.profile.z_range) * truth.direction
-    error = {
-        "angle_deg": float(np.rad2deg(angle_between(belief.axis, truth))),
-        "offset_mm": 1e3 * offset_at(belief.axis, truth, middle),
-    }
+    error = _error(belief, scenario.world.surface)
     console.print(
         f"\n[bold]Estimate against truth[/] after {steps[-1].touches if steps else 0} touches: "
         f"{error['angle_deg']:.2f} deg, {error['offset_mm']:.2f} mm off"
@@ -257,8 +169,9 @@ def _conclude(
     if met:
         with console.status("planning the grasp ..."):
             grasp = replace(scenario.grasp, start=left_at(steps, scenario.planner.start))
-            end = ending(scenario.hand, belief, surface, grasp, rng=rng)
+            end = ending(scenario.hand, belief, scenario.world.surface, grasp, rng=rng)
         print_ending(console, end)
+    truth = scenario.world.surface.axis
     result = {
         "goal_met": met,
         "reason": reason,
@@ -272,32 +185,52 @@ def _conclude(
         "goal": {"angle_deg": options.goal_angle_deg, "offset_mm": options.goal_offset_mm},
         "grasp": ending_record(end),
     }
-    plans = plan_document(scenario.hand, [step.plan for step in steps], end.grasp)
     try:
-        options.out.mkdir(parents=True, exist_ok=True)
-        if steps:
-            words = f"{error['angle_deg']:.2f} deg and {error['offset_mm']:.2f} mm from the truth"
-            episode = episode_of(
-                surface, scenario.world, steps, words, options.sensor,
-                grip_of(scenario.hand, end),
-                partial(act_motions, scenario.hand, scenario.planner.limits),
-            )  # fmt: skip
-            write_page(options.out / "probes.html", scenario.hand, episode)
-        write_json(options.out / "plan.json", plans)
-        write_json(options.out / "result.json", result)
-        raw = raw_touches(options.sensor, steps, scenario.world)
-        if raw is not None:
-            write_raw(options.out / "raw.npz", raw)
+        written = _write(scenario, options, steps, end, result)
     except OSError as failure:
         print(f"plan_grasp: {options.out}: cannot be written ({failure})", file=sys.stderr)
         return 2
-    also = ", probes.html" * bool(steps) + ", raw.npz" * (raw is not None)
-    console.print(f"Written: {options.out}/plan.json, result.json{also}")
+    console.print(f"Written: {options.out}/{', '.join(written)}")
     if met:
         console.print("[bold green]Goal met.[/]")
         return 0
     console.print(f"[bold red]Goal not met[/]: {reason}")
     return 1
+
+
+def _error(belief: Belief, surface: SurfaceOfRevolution) -> dict[str, float]:
+    """Of the direction, and of the position beside the true object's middle."""
+    truth = surface.axis
+    middle = truth.point + np.mean(surface.profile.z_range) * truth.direction
+    return {
+        "angle_deg": float(np.rad2deg(angle_between(belief.axis, truth))),
+        "offset_mm": 1e3 * offset_at(belief.axis, truth, middle),
+    }
+
+
+def _write(
+    scenario: Scenario, options: Options, steps: list[Step], end: Ending, result: dict[str, Any]
+) -> list[str]:
+    """The names of the files written; each is whole or not there."""
+    out, world, written = options.out, scenario.world, ["plan.json", "result.json"]
+    out.mkdir(parents=True, exist_ok=True)
+    if steps:
+        error = result["error"]
+        words = f"{error['angle_deg']:.2f} deg and {error['offset_mm']:.2f} mm from the truth"
+        episode = episode_of(
+            world.surface, world, steps, words, options.sensor, grip_of(scenario.hand, end),
+            partial(act_motions, scenario.hand, scenario.planner.limits),
+        )  # fmt: skip
+        write_page(out / "probes.html", scenario.hand, episode)
+        written.append("probes.html")
+    plans = plan_document(scenario.hand, [step.plan for step in steps], end.grasp)
+    write_json(out / "plan.json", plans)
+    write_json(out / "result.json", result)
+    raw = raw_touches(options.sensor, steps, world)
+    if raw is not None:
+        write_raw(out / "raw.npz", raw)
+        written.append("raw.npz")
+    return written
 
 
 if __name__ == "__main__":
