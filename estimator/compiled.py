@@ -1,6 +1,6 @@
 """Functions compiled to machine code: the inner loops of the estimator.
 
-Compiled once a machine (half a minute at the first call), then loaded from the user's cache
+Compiled once a machine (a minute or two at the first plan), then loaded from the user's cache
 folder: AXIS_BY_TOUCH_CACHE, else XDG_CACHE_HOME, else ~/.cache. numba renews a function only when
 its own file changes, although it holds the code of every function it calls; so the folder is named
 after all sources of this package and of the function's own.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import hypot, sqrt
 from typing import NamedTuple
 
@@ -28,8 +29,15 @@ class Meridian(NamedTuple):
 def meridian_of(profile: Profile) -> Meridian:
     """The table of a profile, over its whole height."""
     low, high = profile.z_range
-    r, dr, _ = profile.derivatives(np.linspace(low, high, _PIECES + 1))
-    return Meridian(float(low), float(high), np.array(r, dtype=float), np.array(dr, dtype=float))
+    return tabulated(float(low), float(high), lambda z: profile.derivatives(z)[:2])
+
+
+def tabulated(
+    low: float, high: float, radius_and_slope_at: Callable[[Array], tuple[Array, Array]]
+) -> Meridian:
+    """The table between two heights [m] of what gives radii [m] and slopes there."""
+    r, dr = radius_and_slope_at(np.linspace(low, high, _PIECES + 1))
+    return Meridian(low, high, np.array(r, dtype=float), np.array(dr, dtype=float))
 
 
 @compiled

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from estimator.compiled import compiled
+from estimator.linear import factor, solve_factored
 from estimator.vectors import Array, Index
 from hand_models.chains import Chains
 from planner.kinematics.placing import pad_jacobian, place_joints, place_pad
-from planner.kinematics.small import solve_leading
 
 DAMPING = 1e-6  # [m^2]
 CLOSE = 1e-7  # [m]
@@ -51,7 +51,8 @@ def pull(
                     system[a, b] = DAMPING if a == b else 0.0
                     for c in joints:
                         system[a, b] += moves[a, c] * moves[b, c]
-            solve_leading(system, lower, error, 3)
+            factor(system, lower)
+            solve_factored(lower, error)
             for c in joints:
                 step = moves[0, c] * error[0] + moves[1, c] * error[1] + moves[2, c] * error[2]
                 path[k, c] = min(max(path[k, c] + step, chains.lower[c]), chains.upper[c])

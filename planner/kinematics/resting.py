@@ -16,11 +16,12 @@ from math import acos, atan2, hypot, sqrt
 import numpy as np
 
 from estimator.compiled import compiled
+from estimator.linear import factor, solve_factored
 from estimator.vectors import Array, Index
 from hand_models.chains import Chains
 from planner.kinematics.meridian import Meridian, foot
 from planner.kinematics.placing import pad_jacobian, place_joints, place_pad
-from planner.kinematics.small import clear, solve_leading, turn_by, turned
+from planner.kinematics.small import clear, turn_by, turned
 
 GAP_UNIT = 0.3e-3  # so far off the surface weighs as much as ...
 ANGLE_UNIT = 0.2  # ... this much of pad angle beyond the cone [rad]
@@ -47,7 +48,7 @@ def rest(
     """
     m, nq, J = fingers.shape[1], q.shape[1], len(chains.parents)
     joints_R, joints_p = np.zeros((J, 3, 3)), np.zeros((J, 3))
-    pads, jacobians = np.zeros((m, 4, 3)), np.zeros((m, 2, 3, nq))  # centre, normal, n, spare
+    pads, jacobians = np.zeros((m, 3, 3)), np.zeros((m, 2, 3, nq))  # centre, normal, n
     rows, residual = np.zeros((ROWS * m, nq + 6)), np.zeros(ROWS * m)
     system, lower = np.zeros((ROWS * m, ROWS * m)), np.zeros((ROWS * m, ROWS * m))
     step = np.zeros(nq + 6)
@@ -183,7 +184,8 @@ def _least_step(
             for c in range(nq + 6):
                 total += rows[k, c] * rows[j, c]
             system[k, j] = total
-    solve_leading(system, lower, residual, len(rows))
+    factor(system, lower)
+    solve_factored(lower, residual)
     longest = 1.0
     for c in range(nq + 6):
         total = 0.0

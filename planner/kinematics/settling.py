@@ -18,10 +18,11 @@ from math import acos, sin
 import numpy as np
 
 from estimator.compiled import compiled
+from estimator.linear import factor, solve_factored
 from estimator.vectors import Array
 from hand_models.chains import Chains
 from planner.kinematics.demands import WORST, Demands, write_rows
-from planner.kinematics.small import solve_leading, turn_by, turned
+from planner.kinematics.small import turn_by, turned
 
 BASE_UNITS = (0.1, 1.0)  # how willingly the base moves, where a joint moves by 1 rad [m], [rad]
 LONGEST = (0.03, 0.4)  # of one step [m], [rad]
@@ -75,7 +76,8 @@ def _step(
                     total += rows[i, c] * rows[j, c] * free[c] * free[c]
                 system[i, j] = total
             dual[i] = residual[i]
-        solve_leading(system, lower, dual, used)
+        factor(system[:used, :used], lower)
+        solve_factored(lower, dual[:used])
         for c in range(unknowns):
             step[c] = 0.0
             for i in range(used):

@@ -11,7 +11,6 @@ from estimator.compiled import V3, compiled
 from estimator.vectors import Array
 
 LEAST_ANGLE = 1e-12  # below which a rotation is the identity [rad]
-LEAST_PIVOT = 1e-12  # of systems that are at least the identity or damped
 
 
 @compiled
@@ -62,22 +61,3 @@ def turn_by(w0: float, w1: float, w2: float, R: Array) -> None:
     """R becomes exp(w) R."""
     for k in range(3):
         R[0, k], R[1, k], R[2, k] = turned(w0, w1, w2, R[0, k], R[1, k], R[2, k])
-
-
-@compiled
-def solve_leading(A: Array, L: Array, y: Array, size: int) -> None:
-    """y becomes A^-1 y for the leading block of a positive definite A, by Cholesky's factor L."""
-    for j in range(size):
-        for k in range(j + 1):
-            total = A[j, k]
-            for m in range(k):
-                total -= L[j, m] * L[k, m]
-            L[j, k] = total / L[k, k] if k < j else sqrt(max(total, LEAST_PIVOT))
-    for j in range(size):
-        for m in range(j):
-            y[j] -= L[j, m] * y[m]
-        y[j] /= L[j, j]
-    for j in range(size - 1, -1, -1):
-        for m in range(j + 1, size):
-            y[j] -= L[m, j] * y[m]
-        y[j] /= L[j, j]

@@ -17,18 +17,15 @@ from hand_models.chains import chains_of
 from hand_models.hand import Hand
 from hand_models.spheres import LinkSpheres
 from planner.kinematics.demands import Demands
-from planner.kinematics.meridian import Meridian
 from planner.kinematics.settling import BASE_UNITS, settle
 from planner.reaching.reach_kinematics import LENGTH
 from planner.reaching.reach_model import BESIDE_PAD
 from planner.reaching.reach_task import HULL_MARGIN, NO_TABLE, ReachTask, Solution
-from planner.reaching.solid import RevolvedSolid
 from planner.reaching.starts import Start
 from planner.reaching.straight import extended
 
 ITERATIONS = 60
 SOLVED = 4e-3  # violation up to which a solution is worth inspecting: 0.2 mm
-_PIECES = 128  # of the meridian
 _JOINT = 1.0  # how willingly a joint moves [rad]
 _FREE_TRAVEL = 0.15  # of a free base from its start [m]
 
@@ -93,7 +90,7 @@ def _settled(
         fingers=rows, points=np.array(task.points), normals=np.array(task.normals),
         lengths=np.array(lengths), cones=np.array(cones),
         R_WO=np.ascontiguousarray(task.solid.X_WO.rotation), p_WO=task.solid.X_WO.translation,
-        meridian=_meridian(task.solid),
+        meridian=task.solid.meridian,
         table=np.array(NO_TABLE if options.table is None else options.table),
         joints=np.asarray(spheres.joints), asked=_asked(hand, spheres, task, rows, knots),
         spheres=np.column_stack([spheres.centres, spheres.radii]),
@@ -168,9 +165,3 @@ def _box(task: ReachTask, start: Start) -> Array:
     if workspace.X_WB is not None:
         middle, half = workspace.X_WB.translation, workspace.position_range
     return np.array([middle - half, middle + half])
-
-
-def _meridian(solid: RevolvedSolid) -> Meridian:
-    z = np.linspace(solid.z[0], solid.z[-1], _PIECES + 1)
-    r = solid.radius(z)
-    return Meridian(float(z[0]), float(z[-1]), r, np.gradient(r, z))

@@ -15,6 +15,7 @@ from scipy.interpolate import BSpline, PchipInterpolator
 
 from estimator.surface import SurfaceOfRevolution
 from hand_models.collision import revolved_slices
+from planner.kinematics.meridian import Meridian, tabulated
 
 Array = NDArray[np.float64]
 
@@ -60,7 +61,18 @@ class RevolvedSolid:
 
     def radius(self, z: ArrayLike) -> Array:
         """Radius at heights between the ends [m]."""
-        return np.asarray(PchipInterpolator(self.z, self.r)(z))
+        return np.asarray(self._profile(z))
+
+    @cached_property
+    def _profile(self) -> PchipInterpolator:
+        return PchipInterpolator(self.z, self.r)
+
+    @cached_property
+    def meridian(self) -> Meridian:
+        """Radius and slope as a table for compiled loops."""
+        return tabulated(
+            float(self.z[0]), float(self.z[-1]), lambda z: (self._profile(z), self._profile(z, 1))
+        )
 
     @cached_property
     def coefficients(self) -> Array:
