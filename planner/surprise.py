@@ -31,8 +31,7 @@ from estimator.vectors import Array, basis_across, frozen
 FEIGNED = 10.0  # real readings fit a little worse than their model: their p-value counts so often
 ALARM = 0.01  # probability of a false alarm at a placement, by either test
 WALL = 0.7  # |n . u| beyond which a contact is not on the wall
-ONCE_BITTEN = 0.1  # the same after a first alarm, when the next placement has to agree
-AGREES = 0.1  # from where later touches confirm earlier ones; doubtful agreement asks for more
+AGREES = 0.1  # from where later touches confirm earlier ones; below, they only count
 MENTIONED = 0.01  # hypotheses that may be the right one
 RESTLESS = 3  # surprises from which the object counts as moving all the time
 LEAST_MOTION = (3e-3, float(np.deg2rad(3.0)))  # rms by which a belief is widened [m], [rad]
@@ -69,7 +68,7 @@ class Learnt:
         belief: What is held true.
         agreeing: Later touches that agreed with earlier ones, since the last that did not.
         surprise: What the last touches contradicted and what was done; None where nothing.
-        surprises: How often that happened beyond doubt.
+        surprises: How often that happened.
         restless: By how much every contact counts as worse placed [m].
     """
 
@@ -91,13 +90,13 @@ def learn(known: Learnt, outcomes: Sequence[Contact | Miss]) -> Learnt:
     felt = tuple(_as_sure(touch, known.restless) for touch in outcomes)
     belief = update(known.belief, felt)
     motion = motion_between(known.belief, belief, felt)
-    if motion is None or motion.p_value > (ONCE_BITTEN if known.surprises else ALARM):
+    if motion is None or motion.p_value > ALARM:
         agree = motion is not None and motion.p_value > AGREES
         agreeing = known.agreeing + agree * sum(isinstance(touch, Contact) for touch in felt)
         return replace(known, belief=belief, agreeing=agreeing, surprise=None)
-    surprises, restless = known.surprises + (motion.p_value <= ALARM), known.restless
+    surprises, restless = known.surprises + 1, known.restless
     words = f"{motion.words}. Earlier contacts now count only as a wider prior"
-    if surprises >= RESTLESS and motion.p_value <= ALARM:
+    if surprises >= RESTLESS:
         restless = max(restless, motion.shift, LEAST_MOTION[0])
         felt = tuple(_as_sure(touch, restless) for touch in outcomes)
         words = f"{words}; it keeps happening, so contacts count as {1e3 * restless:.0f} mm worse"

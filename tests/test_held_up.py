@@ -58,11 +58,11 @@ class Session:
             return felt
         return replace(felt, finger=probe.finger, sensor="gel")
 
-    def steps(self, *, seed, touch=None, options=FAST, budget=BUDGET):
+    def steps(self, *, seed, touch=None, options=FAST):
         return list(
             explore(
                 HAND, touch or self.touch, self.belief, SENSORS["gel"],
-                goal=GOAL, budget=budget, rng=np.random.default_rng(seed), options=options,
+                goal=GOAL, budget=BUDGET, rng=np.random.default_rng(seed), options=options,
             )
         )  # fmt: skip
 
@@ -78,12 +78,9 @@ class Session:
 
 @pytest.mark.parametrize("seed", range(2))
 def test_a_short_object_forces_one_parallel_and_is_still_told(seed):
-    """A disc 20 mm high: all contacts on nearly one parallel, the goal is met all the same.
-
-    One placement more than elsewhere, as one of seed 0's reads three deviations off.
-    """
+    """A disc 20 mm high: all contacts on nearly one parallel, the goal is met all the same."""
     session = Session(cylinder(0.035, 0.02), seed)
-    last = session.steps(seed=seed, budget=BUDGET + 3)[-1]
+    last = session.steps(seed=seed)[-1]
     assert GOAL.met_by(last.after)
     assert not session.wrong(last)
 
