@@ -9,15 +9,20 @@ left over is how far a contact in that cone is misplaced along its normal by tak
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
 from hand_models.fields import HandError
-from hand_models.geometry import vertices
+from hand_models.geometry import link_points, pad_in_joint, vertices
 from hand_models.joints import joint_motion
 from hand_models.part import Part
+
+if TYPE_CHECKING:
+    from hand_models.hand import Hand
 
 Array = NDArray[np.float64]
 
@@ -63,6 +68,28 @@ def fit_pad(points: Array, normal: Array, *, cone: float = CONE) -> PadFit:
         centre = np.linalg.lstsq(u, heights - bounded, rcond=None)[0]
     misfit = heights - u @ np.asarray(centre) - bounded
     return PadFit(np.asarray(centre), normal, bounded, float(np.sqrt(np.mean(misfit**2))))
+
+
+@lru_cache(maxsize=32)
+def pad_bulges(hand: Hand, cone: float) -> Array:
+    """How far each tip's mesh stands out of its pad's sphere where it touches, (F,) [m].
+
+    A touch along a normal u begins so much before the sphere's does; zero where the sphere is
+    foremost, or where a tip has no mesh.
+
+    Args:
+        cone: Largest angle between u and the pad's normal [rad].
+    """
+    out = np.zeros(len(hand.fingers))
+    for i, finger in enumerate(hand.fingers):
+        joint, centre, normal = pad_in_joint(hand, finger)
+        shapes = hand.visual_model.geometryObjects
+        own = [k for k, shape in enumerate(shapes) if int(shape.parentJoint) == joint]
+        if own:
+            points, u = np.vstack([link_points(hand, k) for k in own]), _cap(normal, cone)
+            out[i] = max(np.max((points @ u.T).max(axis=0) - u @ centre) - finger.pad_radius, 0.0)
+    out.setflags(write=False)
+    return out
 
 
 def _cap(normal: Array, cone: float) -> Array:

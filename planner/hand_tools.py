@@ -48,6 +48,11 @@ class HandTools:
     single: ReachSolver
     arm: ArmReach | None
 
+    @property
+    def pad(self) -> float:
+        """Mean radius of the fingers' pads [m]."""
+        return float(np.mean([finger.pad_radius for finger in self.hand.fingers]))
+
     def candidates(
         self, surface: SurfaceOfRevolution, fingers: int, *, count: int, rng: np.random.Generator
     ) -> Candidates:

@@ -125,11 +125,14 @@ def _best_placement(
     if len(candidates) == 0:
         return funnel
     samples = sample_objects(belief, options.objects, rng=rng)
-    worth = Worth(belief, samples, sensor, goal, options.grasp_height, untold=options.offset_guard)
+    worth = Worth(
+        belief, samples, sensor, goal, options.grasp_height,
+        untold=options.offset_guard, pad=tools.pad,
+    )  # fmt: skip
     rank_all = partial(
         rank, belief=belief, samples=samples, noise=sensor, goal=goal,
         margin=options.margin, offset_guard=options.offset_guard, height=options.grasp_height,
-        criterion=options.criterion, rng=rng,
+        pad=tools.pad, criterion=options.criterion, rng=rng,
     )  # fmt: skip
     ranking, scored = rank_all(candidates), 0
     if options.sweep and tools.arm is None and count == 3 and options.criterion == "information":

@@ -8,6 +8,7 @@ starts included.
 
 Examples:
     python scripts/benchmark_reach.py --targets 200 --hands allegro_right trifinger_edu
+    python scripts/benchmark_reach.py --targets 200 --hands dex3_right psyonic_right --made
 """
 
 from __future__ import annotations
@@ -17,12 +18,14 @@ import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
 import pinocchio as pin
 import tyro
 from reach_peers import MinkPeer, Peer, PinkPeer, ScipyPeer
+from reach_triples import Target, made_targets, targets
 from rich.console import Console
 from rich.table import Table
 
@@ -33,13 +36,9 @@ from hand_models.spheres import link_spheres
 from planner.reaching.inspection import inspect
 from planner.reaching.reach import Reach, ReachSolver
 from planner.reaching.reach_task import ReachOptions, ReachTask, Solution
-from planner.reaching.solid import RevolvedSolid
 from planner.reaching.starts import Start, StartSearch
 
-HALF_HEIGHT = 0.09  # of the cylinders [m]
 WARM = 4  # targets before the clock runs
-SPREAD = 0.03  # of contacts about the middle height [m]
-LEAST_GAP = np.radians(40.0)  # between meridians
 PEERS = {"scipy": ScipyPeer, "pink": PinkPeer, "mink": MinkPeer}
 
 
@@ -53,19 +52,13 @@ class Options:
     """Triples for each hand."""
     peers: tuple[Literal["scipy", "pink", "mink"], ...] = ("scipy", "pink", "mink")
     """Beside whom; those that are not installed, or not made for a hand, are left out."""
+    made: bool = False
+    """Targets that postures of the hand nearly make, to 2 mm, instead of any; a hand of few joints
+    reaches none of the latter."""
     effort: int = 12
     """How many times as many starts the oracle may use."""
     seed: int = 0
     """Of the targets."""
-
-
-@dataclass(frozen=True, eq=False)
-class Target:
-    """Three contacts on a cylinder."""
-
-    points: np.ndarray
-    normals: np.ndarray
-    solid: RevolvedSolid
 
 
 @dataclass(frozen=True)
@@ -87,30 +80,13 @@ def main() -> int:
         return 2
     for name in options.hands:
         try:
-            hand = load_hand(name)
-        except HandError as error:
+            with console.status(f"{name} ..."):
+                tallies = measured(load_hand(name), options)
+        except (HandError, ValueError) as error:
             print(f"benchmark_reach: {error}", file=sys.stderr)
             return 2
-        with console.status(f"{name} ..."):
-            tallies = measured(hand, options)
         console.print(_table(name, tallies))
     return 0
-
-
-def targets(count: int, seed: int) -> Iterator[Target]:
-    """Radii 20 to 60 mm, meridians at least 40 degrees apart, heights within 30 mm."""
-    rng = np.random.default_rng(seed)
-    while count:
-        theta = rng.uniform(0.0, 2.0 * np.pi, 3)
-        gaps = np.diff(np.sort(theta), append=np.sort(theta)[0] + 2.0 * np.pi)
-        if gaps.min() < LEAST_GAP:
-            continue
-        count -= 1
-        radius, z = rng.uniform(0.02, 0.06), rng.uniform(-SPREAD, SPREAD, 3)
-        n = np.column_stack([np.cos(theta), np.sin(theta), np.zeros(3)])
-        ends = np.array([-HALF_HEIGHT, 0.0, HALF_HEIGHT])
-        solid = RevolvedSolid(pin.SE3.Identity(), ends, np.full(3, radius))
-        yield Target(radius * n + z[:, None] * [0.0, 0.0, 1.0], n, solid)
 
 
 def measured(hand: Hand, options: Options) -> dict[str, Tally]:
@@ -121,9 +97,10 @@ def measured(hand: Hand, options: Options) -> dict[str, Tally]:
     search, collision = StartSearch(hand, link_spheres(hand)), HandCollision(hand)
     peers = dict(_peers(hand, rules, options.peers))
     found: dict[str, list[tuple[bool, float]]] = {n: [] for n in ("ours", *peers, "anyone")}
-    for warm in targets(WARM, options.seed + 1):  # problems are written down once per hand
+    drawn = partial(made_targets, hand) if options.made else targets
+    for warm in drawn(WARM, options.seed + 1):  # problems are written down once per hand
         _ours(ours, warm)
-    for target in targets(options.targets, options.seed):
+    for target in drawn(options.targets, options.seed):
         row = {"ours": _timed(lambda t=target: _ours(ours, t))}
         for name, peer in peers.items():
             row[name] = _timed(lambda t=target, p=peer: _peer(p, hand, search, collision, rules, t))

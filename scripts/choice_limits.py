@@ -25,7 +25,6 @@ from estimator.vectors import Array
 from planner.candidates import END_MARGIN
 from planner.choosing.choice import MARGIN
 from planner.choosing.optimum import best_touches, place_grid
-from planner.choosing.prospects import prospects
 from planner.choosing.worth import Worth
 from planner.goal import Goal
 from sim_sensor.camera import coarse_view
@@ -120,7 +119,7 @@ def _known(surface: SurfaceOfRevolution, radius: float) -> Worth:
 def _on(truth: Worth, believed: SurfaceOfRevolution, theta: Array, z: Array) -> tuple[Array, int]:
     """Information on the true object of touches aimed at places of a believed one."""
     place = believed.at(theta[None], z[None])
-    landed = prospects(truth.samples, place.p, place.n)
+    landed = truth.landed(place)
     return truth.information(landed)[0, 0].sum(axis=0), int(landed.hit.sum())
 
 

@@ -112,7 +112,7 @@ def _anywhere(
         ranking = rank(
             candidates, belief, samples, told, GOAL,
             margin=MARGIN if fresh else 0.0, offset_guard=OFFSET_GUARD, criterion=criterion,
-            rng=rng,
+            pad=PAD, rng=rng,
         )  # fmt: skip
         best = int(ranking.order[0])
         place = belief.surface.at(candidates.theta[best], candidates.z[best])

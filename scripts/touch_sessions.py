@@ -35,7 +35,6 @@ from hand_models import load_hand
 from hand_models.hand import Hand
 from planner.candidates import Candidates
 from planner.choosing.choice import Ranking
-from planner.choosing.prospects import prospects
 from planner.choosing.worth import Worth
 from planner.explore import Step, explore
 from planner.goal import Goal
@@ -175,7 +174,7 @@ class _Session:
             plan = plan_preferred(
                 hand, _right(belief, self.surface), self.told, (3, 2, 1), goal=GOAL, rng=rng,
                 options=replace(options, placements=ORACLE_PLACEMENTS),
-                prefer=_knowing(self.surface, belief, self.told),
+                prefer=_knowing(self.surface, belief, self.told, hand.fingers[0].pad_radius),
             )  # fmt: skip
             felt = tuple(self._touch(probe) for probe in plan.probes)
             yield Step(plan, felt, belief, update(belief, felt), len(felt))
@@ -267,17 +266,19 @@ def label_right(record: TouchRecord, row_0: float) -> bool:
     return bool((row_0 > 0.5) == (nearer == 0))
 
 
-def _knowing(surface: SurfaceOfRevolution, before: Belief, told: SensorNoise) -> Preference:
+def _knowing(
+    surface: SurfaceOfRevolution, before: Belief, told: SensorNoise, pad: float
+) -> Preference:
     """Candidates by the error they leave on the true object, from what was known before."""
     low, high = surface.profile.z_range
     z = np.linspace(low, high, _NODES)
     radii = surface.profile.derivatives(z)[0][None]
     truth = SampledObjects(surface.axis.point[None], surface.axis.direction[None], z, radii)
-    worth = Worth(before, truth, told, GOAL)
+    worth = Worth(before, truth, told, GOAL, pad=pad)
 
     def prefer(candidates: Candidates, ranking: Ranking) -> Index:
         place = surface.at(candidates.theta, candidates.z)
-        after = worth.covariances(prospects(truth, place.p, place.n))[0]
+        after = worth.covariances(worth.landed(place))[0]
         error = np.trace(after, axis1=1, axis2=2)
         return np.asarray(ranking.order[np.argsort(error[ranking.order])])
 

@@ -114,7 +114,7 @@ def test_approaches_land_on_the_sampled_objects_and_on_their_line():
     held = belief(angle=15.0, offset=0.015)
     samples = sample_objects(held, 8, rng=np.random.default_rng(1))
     place = held.surface.at(np.deg2rad([[0.0, 100.0, 230.0]]), np.array([[-0.02, 0.0, 0.02]]))
-    landed = prospects(samples, place.p, place.n)
+    landed = prospects(samples, place.p, place.n, pad=0.0)
     p = landed.geometry.p.reshape(8, 1, 3, 3)
     along = np.sum((place.p - p) * place.n, axis=-1)
     off_line = np.linalg.norm(place.p - along[..., None] * place.n - p, axis=-1)

@@ -12,7 +12,6 @@ from estimator.sensors import SENSORS
 from planner.candidates import Candidates
 from planner.choosing.choice import rank
 from planner.choosing.optimum import best_touches, certificate, place_grid, refined
-from planner.choosing.prospects import prospects
 from planner.choosing.risk import AMBIGUOUS, MISSED, risks, risks_in_words
 from planner.choosing.worth import Worth
 from planner.goal import Goal
@@ -45,7 +44,7 @@ def random_candidates(seed, count=80):
 def value_at(held, theta, z):
     """Expected error by plain covariances, without the compiled kernel."""
     place = held.belief.surface.at(theta, z)
-    after = held.covariances(prospects(held.samples, place.p, place.n))
+    after = held.covariances(held.landed(place))
     return np.exp(0.5 * np.log(np.einsum("bnii->bn", after)).mean(axis=0))
 
 
@@ -58,7 +57,7 @@ def test_the_optimum_is_no_worse_than_any_triple_of_its_grid(seed):
     sets = np.random.default_rng(seed).integers(0, len(grid.theta), size=(400, 3))
     theta, z = grid.theta[sets], grid.z[sets]
     place = held.belief.surface.at(theta, z)
-    landed = prospects(held.samples, place.p, place.n)
+    landed = held.landed(place)
     kept = held.least_margins(landed).min(axis=1) >= MARGIN
     values = value_at(held, theta, z)
     assert best.value <= values[kept].min() + 1e-9
@@ -140,7 +139,7 @@ def test_chances_are_shares_of_the_objects():
     place = held.belief.surface.at(
         np.deg2rad([[0.0, 120.0, 240.0]]), np.array([[-0.025, 0, 0.058]])
     )
-    landed = prospects(held.samples, place.p, place.n)
+    landed = held.landed(place)
     assert chance == pytest.approx(np.mean(~landed.hit[:, 0].all(axis=1)))
 
 

@@ -142,7 +142,7 @@ def test_approaches_meet_sampled_walls_where_a_bisection_does():
     n = np.column_stack([np.cos(theta), np.sin(theta), 0.1 * np.sin(3.0 * theta)])
     n /= np.linalg.norm(n, axis=1)[:, None]
     p = 0.035 * n + np.outer(np.linspace(-0.03, 0.03, 12), [0.0, 0.0, 1.0])
-    landed = prospects(objects, p[None], n[None])
+    landed = prospects(objects, p[None], n[None], pad=0.0)
     surfaces = SampledSurfaces(objects)
     assert landed.hit.all()
 

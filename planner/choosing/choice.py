@@ -30,7 +30,7 @@ from estimator.surface import Geometry
 from estimator.vectors import Array, Index
 from planner.candidates import Candidates
 from planner.choosing.criteria import REFUSING, Criterion, Merits, costs
-from planner.choosing.prospects import Prospects, prospects
+from planner.choosing.prospects import Prospects
 from planner.choosing.worth import Worth
 from planner.goal import Goal
 
@@ -87,6 +87,7 @@ def rank(
     margin: float = MARGIN,
     offset_guard: float = 0.0,
     height: float = 0.0,
+    pad: float = 0.0,
     criterion: Criterion = "information",
     rng: np.random.Generator | None = None,
 ) -> Ranking:
@@ -99,11 +100,12 @@ def rank(
         offset_guard: Sd of a common rotation of the directions that the expected error reckons
             with beside what the sensor admits [rad]; bound and predicted covariance do not.
         height: Of the later grasp above the believed axis' point: where the offset counts [m].
+        pad: Radius of the hand's pads [m].
         rng: For the criterion `random` only.
     """
-    worth = Worth(belief, samples, noise, goal, height, untold=offset_guard)
+    worth = Worth(belief, samples, noise, goal, height, untold=offset_guard, pad=pad)
     place = belief.surface.at(candidates.theta, candidates.z)
-    landed = prospects(samples, place.p, place.n)
+    landed = worth.landed(place)
     after = worth.covariances(landed)
     value, angle, offset = _expected_error(after)
     bound, best_bound = _pair_bound(candidates.theta, place, noise)

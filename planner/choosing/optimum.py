@@ -21,7 +21,7 @@ from estimator.triple_scores import triple_scores
 from estimator.vectors import Array, Index, frozen
 from planner.candidates import END_MARGIN
 from planner.choosing.choice import Ranking
-from planner.choosing.prospects import Prospects, prospects
+from planner.choosing.prospects import Prospects
 from planner.choosing.worth import Worth
 
 MERIDIANS, HEIGHTS = 12, 5
@@ -183,14 +183,14 @@ def refined(worth: Worth, optimum: Optimum, grid: Grid, *, margin: float) -> flo
 def value_at(worth: Worth, theta: Array, z: Array) -> float:
     """Expected error after touches at places (m,), in goals."""
     place = worth.belief.surface.at(theta[None], z[None])
-    after = worth.covariances(prospects(worth.samples, place.p, place.n))[:, 0]
+    after = worth.covariances(worth.landed(place))[:, 0]
     return float(np.exp(0.5 * np.log(np.einsum("bii->b", after)).mean()))
 
 
 def _land(worth: Worth, theta: Array, z: Array) -> Prospects:
     """Each place touched on every sampled object, (B, G, 1)."""
     place = worth.belief.surface.at(theta[:, None], z[:, None])
-    return prospects(worth.samples, place.p, place.n)
+    return worth.landed(place)
 
 
 @lru_cache(maxsize=8)

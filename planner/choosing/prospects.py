@@ -19,6 +19,7 @@ from planner.kinematics.meeting import fill_met
 
 BEFORE, BEHIND = 0.030, 0.025  # how far an approach goes, about the expected contact [m]
 STEPS = 6
+MET = 5e-4  # gap that counts as none [m]
 RIM = 0.02  # of the height at each end where a touch does not count as one of the wall
 
 
@@ -47,19 +48,20 @@ class Prospects:
         return PlacedTriples(self.theta, self.z, self.r, self.dr, self.ddr)
 
 
-def prospects(samples: SampledObjects, p_W: Array, n_W: Array) -> Prospects:
-    """Follow approaches along -n to each sampled object.
+def prospects(samples: SampledObjects, p_W: Array, n_W: Array, *, pad: float) -> Prospects:
+    """Follow pads along -n to each sampled object.
 
     Args:
         p_W, n_W: Expected contacts and outward normals, (N, m, 3) [m], unit.
+        pad: Radius of the pads; zero for points [m].
     """
     B, (N, m) = len(samples.points), p_W.shape[:2]
     surfaces = SampledSurfaces(samples)
-    s, theta, off_wall, z = _met(surfaces, p_W.reshape(-1, 3), n_W.reshape(-1, 3))
+    s, theta, off_wall, z = _met(surfaces, p_W.reshape(-1, 3), n_W.reshape(-1, 3), pad)
     low, high = surfaces.profiles.z_range
     inset = RIM * (high - low)
     inside = np.clip(z, low, high)
-    hit = (np.abs(off_wall) < 5e-4) & (s > -BEFORE) & (s < BEHIND)
+    hit = (off_wall < MET) & (s > -BEFORE) & (s < BEHIND)
     hit &= (z > low + inset) & (z < high - inset)
     places = (theta, inside, *surfaces.profiles.derivatives(inside))
     theta, inside, r, dr, ddr = (x.reshape(B, N, m) for x in places)
@@ -69,13 +71,15 @@ def prospects(samples: SampledObjects, p_W: Array, n_W: Array) -> Prospects:
     )  # fmt: skip
 
 
-def _met(surfaces: SampledSurfaces, p: Array, n: Array) -> tuple[Array, Array, Array, Array]:
-    """Where lines p - s n (M, 3) meet walls: s, meridian angle, what is left, height, (B, M)."""
+def _met(
+    surfaces: SampledSurfaces, p: Array, n: Array, pad: float
+) -> tuple[Array, Array, Array, Array]:
+    """Where pads on lines p - s n (M, 3) meet walls: s, meridian angle, gap, height, (B, M)."""
     objects, met = surfaces.objects, np.zeros((len(surfaces.objects.points), len(p), 4))
     fill_met(
         np.asarray(objects.z), surfaces.profiles.coefficients, np.asarray(objects.points),
         surfaces.frames, np.ascontiguousarray(p), np.ascontiguousarray(n),
-        np.array([-1.5 * BEFORE, 1.5 * BEHIND]), STEPS, met,
+        np.full(len(p), pad), np.array([-1.5 * BEFORE, 1.5 * BEHIND]), STEPS, met,
     )  # fmt: skip
     s, theta, off_wall, z = np.moveaxis(met, -1, 0)
     return s, theta, off_wall, z

@@ -15,7 +15,7 @@ from estimator.prior import AxisPrior
 from estimator.singular import SINGULARITIES, margins
 from estimator.surface import Geometry
 from estimator.vectors import Array
-from planner.choosing.prospects import Prospects, prospects, with_earlier
+from planner.choosing.prospects import Prospects, with_earlier
 from planner.choosing.worth import Worth
 
 WORTH_SAYING = 0.05
@@ -48,7 +48,7 @@ def risks(worth: Worth, theta: Array, z: Array, *, margin: float) -> tuple[Risk,
         theta, z: Their places on the believed surface, (m,).
     """
     place = worth.belief.surface.at(theta[None], z[None])
-    landed = prospects(worth.samples, place.p, place.n)
+    landed = worth.landed(place)
     found = [Risk(MISSED, float(np.mean(~landed.hit.all(axis=(1, 2)))))]
     earlier = np.array([c.position for c in worth.belief.contacts]).reshape(-1, 3)
     triples = with_earlier(landed, worth.samples, earlier)

@@ -25,7 +25,6 @@ from hand_models.postures import Postures
 from hand_models.spheres import LinkSpheres
 from planner.candidates import END_MARGIN, GAP, Candidates, clear_of_object
 from planner.choosing.choice import Ranking
-from planner.choosing.prospects import prospects
 from planner.choosing.worth import Worth
 
 FROM = 4  # placements, the best of those laid
@@ -168,7 +167,7 @@ def _information(worth: Worth, all_reached: list[_Reached]) -> Array:
     """Of all places of all placements, one after another, (B, G, 5, 5)."""
     theta, z = (np.concatenate([getattr(r, x) for r in all_reached]) for x in ("theta", "z"))
     place = worth.belief.surface.at(theta[:, None], z[:, None])
-    return worth.information(prospects(worth.samples, place.p, place.n))[:, :, 0]
+    return worth.information(worth.landed(place))[:, :, 0]
 
 
 def _best(scores: Array, count: int) -> Index:

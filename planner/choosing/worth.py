@@ -10,9 +10,10 @@ from estimator.belief import Belief, SampledObjects
 from estimator.contact import SensorNoise
 from estimator.information import contact_information, known_before, with_untold_rotation
 from estimator.singular import margins
+from estimator.surface import Geometry
 from estimator.triple_scores import in_goals
 from estimator.vectors import Array
-from planner.choosing.prospects import Prospects, with_earlier
+from planner.choosing.prospects import Prospects, prospects, with_earlier
 from planner.goal import Goal
 
 DOUBTFUL_OBJECTS = 0.25  # share of the objects that may come nearer to a singularity
@@ -28,6 +29,7 @@ class Worth:
             [m], from the axis' point.
         untold: Sd of a common rotation of the directions that the expected error reckons with
             beside what the sensor admits [rad]: the estimator will not know of it.
+        pad: Radius of the hand's pads [m].
     """
 
     belief: Belief
@@ -36,11 +38,16 @@ class Worth:
     goal: Goal
     height: float = 0.0
     untold: float = 0.0
+    pad: float = 0.0
 
     @property
     def before(self) -> Array:
         """What is known already, in goals, (5, 5)."""
         return self._scaled(known_before(self.belief.covariance, self.noise.direction_offset))
+
+    def landed(self, place: Geometry) -> Prospects:
+        """Touches planned at places (N, m), on each object."""
+        return prospects(self.samples, place.p, place.n, pad=self.pad)
 
     def information(self, landed: Prospects) -> Array:
         """Of each touch on each object, zero where it misses, in goals, (B, N, m, 5, 5)."""

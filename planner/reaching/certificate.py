@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from hand_models.collision import HandCollision, LinkPair, ObjectClearance
 from hand_models.hand import Hand
+from hand_models.pads import pad_bulges
 from planner.reaching.solid import RevolvedSolid
 
 Array = NDArray[np.float64]
@@ -61,8 +62,10 @@ class Tolerances:
         cone: Largest pad angle [rad].
         self_clearance: Least distance between links [m].
         object_clearance: Least distance between object and links that do not touch [m]. What is
-            fixed to a touching pad only has to be outside.
-        pad_depth: How deep a touching pad may be in the object, where it is hollow [m].
+            fixed to a touching pad only has to be outside, but for what its mesh stands out of
+            the pad's sphere that is planned with (`hand_models.pads.pad_bulges`).
+        pad_depth: How deep a touching pad may be in the object, where it is hollow or where its
+            mesh is more than a sphere [m].
     """
 
     position: float
@@ -145,9 +148,11 @@ def faults(
     pair = found.self_pair
     if pair.distance < allowed.self_clearance:
         yield gap_in_words(pair)
+    order = [hand.fingers.index(hand.finger(name)) for name in fingers]
+    bulge = min(float(pad_bulges(hand, allowed.cone)[order].max()), allowed.pad_depth)
     for (link, distance), least in (
         (found.links, allowed.object_clearance),
-        (found.tip_links, -_TOUCH),
+        (found.tip_links, -_TOUCH - bulge),
     ):
         if distance < least:
             yield gap_in_words(LinkPair(link, "the object", distance))
