@@ -174,7 +174,7 @@ class _Session:
             plan = plan_preferred(
                 hand, _right(belief, self.surface), self.told, (3, 2, 1), goal=GOAL, rng=rng,
                 options=replace(options, placements=ORACLE_PLACEMENTS),
-                prefer=_knowing(self.surface, belief, self.told, hand.fingers[0].pad_radius),
+                prefer=self._knowing(belief, hand.fingers[0].pad_radius),
             )  # fmt: skip
             felt = tuple(self._touch(probe) for probe in plan.probes)
             yield Step(plan, felt, belief, update(belief, felt), len(felt))
@@ -183,6 +183,23 @@ class _Session:
             hand, self._touch, belief, self.told,
             goal=GOAL, budget=self.job.budget, rng=rng, options=options,
         )  # fmt: skip
+
+    def _knowing(self, before: Belief, pad: float) -> Preference:
+        """Candidates by the error they leave on the true object, from what was known before; an
+        untold offset of the sensor is known, too."""
+        surface = self.surface
+        z = np.linspace(*surface.profile.z_range, _NODES)
+        radii = surface.profile.derivatives(z)[0][None]
+        truth = SampledObjects(surface.axis.point[None], surface.axis.direction[None], z, radii)
+        untold = OFFSET if self.job.setting == "offset" else 0.0
+        worth = Worth(before, truth, self.told, GOAL, untold=untold, pad=pad)
+
+        def prefer(candidates: Candidates, ranking: Ranking) -> Index:
+            after = worth.covariances(worth.landed(surface.at(candidates.theta, candidates.z)))[0]
+            error = np.trace(after, axis1=1, axis2=2)
+            return np.asarray(ranking.order[np.argsort(error[ranking.order])])
+
+        return prefer
 
     def _touch(self, probe: Probe) -> Contact | Miss:
         felt = self.world.touch(probe.approach)
@@ -264,25 +281,6 @@ def label_right(record: TouchRecord, row_0: float) -> bool:
         return True
     nearer = int(np.argmax(np.abs(record.outcome.directions @ record.truth.k_theta)))
     return bool((row_0 > 0.5) == (nearer == 0))
-
-
-def _knowing(
-    surface: SurfaceOfRevolution, before: Belief, told: SensorNoise, pad: float
-) -> Preference:
-    """Candidates by the error they leave on the true object, from what was known before."""
-    low, high = surface.profile.z_range
-    z = np.linspace(low, high, _NODES)
-    radii = surface.profile.derivatives(z)[0][None]
-    truth = SampledObjects(surface.axis.point[None], surface.axis.direction[None], z, radii)
-    worth = Worth(before, truth, told, GOAL, pad=pad)
-
-    def prefer(candidates: Candidates, ranking: Ranking) -> Index:
-        place = surface.at(candidates.theta, candidates.z)
-        after = worth.covariances(worth.landed(place))[0]
-        error = np.trace(after, axis1=1, axis2=2)
-        return np.asarray(ranking.order[np.argsort(error[ranking.order])])
-
-    return prefer
 
 
 def _right(belief: Belief, surface: SurfaceOfRevolution) -> Belief:
