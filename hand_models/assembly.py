@@ -5,15 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from hand_models.description import (
-    ArmDescription,
-    CopyDescription,
-    HandDescription,
-    SourceDescription,
-)
+from hand_models.carriers import ArmDescription
+from hand_models.description import CopyDescription, HandDescription
 from hand_models.fields import HandError, Vector
 from hand_models.mjcf import read_mjcf
 from hand_models.part import Part, coupled, empty_part, grafted
+from hand_models.sources import SourceDescription
 from hand_models.urdf import read_urdf
 
 _ONE_DEGREE = (1, 1)

@@ -6,38 +6,36 @@ checked for shape and sense, and its files are found; `hand.load_hand` checks it
 
 from __future__ import annotations
 
-import importlib.metadata
 import importlib.resources
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources.abc import Traversable
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any
 
+from hand_models.carriers import (
+    NOWHERE,
+    ArmDescription,
+    WristDescription,
+    read_arm,
+    read_wrist,
+)
 from hand_models.fields import (
     HandError,
     Vector,
-    numbers,
-    optional_text,
     positive,
     refuse_unknown_keys,
     tables,
     text,
-    texts,
     unit_vector,
     vector,
 )
+from hand_models.sources import SOURCE_KEYS, SourceDescription, read_source
 
-_SOURCE_KEYS = {"source", "distribution", "package_directories", "base", "without", "fixed"}
-_HAND_KEYS = {*_SOURCE_KEYS, "name", "copies", "arm", "fingers"}
-_ARM_KEYS = {
-    *_SOURCE_KEYS, "prefix", "flange", "position", "rotation_deg", "at", "at_rotation_deg", "home",
-}  # fmt: skip
+_HAND_KEYS = {*SOURCE_KEYS, "name", "copies", "arm", "wrist", "fingers"}
 _COPY_KEYS = {"prefix", "position", "rotation_deg"}
 _FINGER_KEYS = {"name", "tip_frame", "pad_centre", "pad_normal", "pad_radius"}
-_ENDINGS = (".urdf", ".xml")
-_NOWHERE: Vector = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -60,25 +58,6 @@ class FingerDescription:
 
 
 @dataclass(frozen=True)
-class SourceDescription:
-    """The part of a model file that is meant.
-
-    Attributes:
-        file: A URDF, or an MJCF if it ends in ".xml"; exists.
-        package_directories: Folders in which the URDF's meshes are looked up.
-        base: The link all else hangs on; None takes the whole.
-        without: Links that are left out, with all that hangs on them.
-        fixed: Joints that are held, and where [rad], [m].
-    """
-
-    file: Path
-    package_directories: tuple[Path, ...]
-    base: str | None
-    without: tuple[str, ...]
-    fixed: Mapping[str, float]
-
-
-@dataclass(frozen=True)
 class CopyDescription:
     """One `[[copies]]` table: the source once more, elsewhere.
 
@@ -94,29 +73,6 @@ class CopyDescription:
 
 
 @dataclass(frozen=True)
-class ArmDescription:
-    """The `[arm]` table: what carries the hand.
-
-    Attributes:
-        source: Where its model comes from.
-        prefix: Put before its names, where they are the hand's, too.
-        flange: The link the hand is mounted on.
-        position, rotation_deg: Of the hand base in the flange [m], [deg].
-        at, at_rotation_deg: Of the arm's root in the world [m], [deg].
-        home: Where its joints begin, by name, mid-range for the others [rad], [m].
-    """
-
-    source: SourceDescription
-    prefix: str
-    flange: str
-    position: Vector
-    rotation_deg: Vector
-    at: Vector
-    at_rotation_deg: Vector
-    home: Mapping[str, float]
-
-
-@dataclass(frozen=True)
 class HandDescription:
     """A checked description, its files found.
 
@@ -124,7 +80,8 @@ class HandDescription:
         name: Name of the hand.
         source: Where its model comes from.
         copies: Where that stands; empty for once, at the hand base.
-        arm: What carries it; None leaves the hand free.
+        arm: What carries it.
+        wrist: How far something else does; with neither the hand is free.
         fingers: At least one.
     """
 
@@ -132,6 +89,7 @@ class HandDescription:
     source: SourceDescription
     copies: tuple[CopyDescription, ...]
     arm: ArmDescription | None
+    wrist: WristDescription | None
     fingers: tuple[FingerDescription, ...]
 
 
@@ -179,57 +137,16 @@ def _parse(file: Traversable, where: str) -> dict[str, Any]:
 
 def _checked(table: Mapping[str, Any], folder: Path, where: str) -> HandDescription:
     refuse_unknown_keys(table, _HAND_KEYS, where)
+    if "arm" in table and "wrist" in table:
+        raise HandError(f"{where}: the hand is held by [arm] or within [wrist], not both")
     return HandDescription(
         name=text(table, "name", where),
-        source=_source(table, folder, where),
+        source=read_source(table, folder, where),
         copies=_copies(table, where),
-        arm=_arm(table["arm"], folder, f"{where}: arm") if "arm" in table else None,
+        arm=read_arm(table["arm"], folder, f"{where}: arm") if "arm" in table else None,
+        wrist=read_wrist(table["wrist"], f"{where}: wrist") if "wrist" in table else None,
         fingers=_fingers(table, where),
     )
-
-
-def _source(table: Mapping[str, Any], folder: Path, where: str) -> SourceDescription:
-    source = PurePosixPath(text(table, "source", where))
-    if source.suffix not in _ENDINGS:
-        raise HandError(f"{where}: source '{source}' must be a .urdf file, or an MJCF .xml file")
-    distribution = optional_text(table, "distribution", where)
-    if distribution is not None:
-        folder = _distribution_folder(distribution, source, where)
-    file = folder / source
-    if not file.is_file():
-        raise HandError(f"{where}: source '{file}' is not a file")
-    directories = tuple(
-        folder / entry for entry in texts(table, "package_directories", where, ["."])
-    )
-    for directory in directories:
-        if not directory.is_dir():
-            raise HandError(f"{where}: package directory '{directory}' is not a folder")
-    return SourceDescription(
-        file,
-        directories,
-        optional_text(table, "base", where),
-        tuple(texts(table, "without", where, [])),
-        numbers(table, "fixed", where),
-    )
-
-
-def _distribution_folder(distribution: str, source: PurePosixPath, where: str) -> Path:
-    """Folder below which an installed distribution keeps `source`.
-
-    The distribution's own record of its files is asked, because such wheels hold data only: there
-    is no module to import, and the packager's prefix before `source` is not ours to know.
-    """
-    try:
-        files = importlib.metadata.files(distribution) or []
-    except importlib.metadata.PackageNotFoundError as error:
-        raise HandError(
-            f"{where}: distribution '{distribution}' is not installed: pip install {distribution}"
-        ) from error
-    tail = source.parts
-    for file in files:
-        if file.parts[-len(tail) :] == tail:
-            return Path(str(file.locate())).resolve().parents[len(tail) - 1]
-    raise HandError(f"{where}: distribution '{distribution}' has no file '{source}'")
 
 
 def _copies(table: Mapping[str, Any], where: str) -> tuple[CopyDescription, ...]:
@@ -243,24 +160,8 @@ def _copy(table: Mapping[str, Any], where: str) -> CopyDescription:
     refuse_unknown_keys(table, _COPY_KEYS, where)
     return CopyDescription(
         prefix=text(table, "prefix", where),
-        position=vector(table, "position", where, _NOWHERE),
-        rotation_deg=vector(table, "rotation_deg", where, _NOWHERE),
-    )
-
-
-def _arm(table: object, folder: Path, where: str) -> ArmDescription:
-    if not isinstance(table, dict):
-        raise HandError(f"{where} must be a table, [arm], got {table!r}")
-    refuse_unknown_keys(table, _ARM_KEYS, where)
-    return ArmDescription(
-        source=_source(table, folder, where),
-        prefix=optional_text(table, "prefix", where) or "",
-        flange=text(table, "flange", where),
-        position=vector(table, "position", where, _NOWHERE),
-        rotation_deg=vector(table, "rotation_deg", where, _NOWHERE),
-        at=vector(table, "at", where, _NOWHERE),
-        at_rotation_deg=vector(table, "at_rotation_deg", where, _NOWHERE),
-        home=numbers(table, "home", where),
+        position=vector(table, "position", where, NOWHERE),
+        rotation_deg=vector(table, "rotation_deg", where, NOWHERE),
     )
 
 

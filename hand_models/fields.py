@@ -59,6 +59,13 @@ def positive(table: Mapping[str, Any], key: str, where: str) -> float:
     return float(value)
 
 
+def number_within(table: Mapping[str, Any], key: str, where: str, low: float, high: float) -> float:
+    value = _required(table, key, where)
+    if not _is_number(value) or not low <= value <= high:
+        raise HandError(f"{where}: {key} must be a number from {low:g} to {high:g}, got {value!r}")
+    return float(value)
+
+
 def numbers(table: Mapping[str, Any], key: str, where: str) -> dict[str, float]:
     """A table of finite numbers by name; empty if the key is not there."""
     value = table.get(key, {})

@@ -19,17 +19,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from hand_models.arm import Arm
 from hand_models.assembly import assembled, mounted, placed
-from hand_models.description import (
-    ArmDescription,
-    FingerDescription,
-    known_hands,
-    read_description,
-)
+from hand_models.carriers import ArmDescription, WristDescription
+from hand_models.description import FingerDescription, known_hands, read_description
 from hand_models.fields import HandError
 from hand_models.joints import joint_motions
 from hand_models.part import Coupling, Part, coupled, link_id
 from hand_models.pose import HandPose
 from hand_models.sense import check_sense
+from hand_models.wrist import Wrist
 
 __all__ = ["Finger", "Hand", "HandError", "HandPose", "known_hands", "load_hand"]
 
@@ -78,7 +75,8 @@ class Hand:
         lower: (nq,) lower joint limits [rad], [m] for a prismatic joint.
         upper: (nq,) upper joint limits, likewise.
         arm: What carries it: then B is the arm's root, which stands still, q holds the arm's
-            joints, too, and the fingers' own joints are those of the hand; None for a free hand.
+            joints, too, and the fingers' own joints are those of the hand.
+        wrist: How far something else brings it; with neither it is free.
     """
 
     name: str
@@ -88,6 +86,7 @@ class Hand:
     lower: Array
     upper: Array
     arm: Arm | None = None
+    wrist: Wrist | None = None
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -179,6 +178,8 @@ def load_hand(name_or_path: str | Path) -> Hand:
         part = assembled(description)
         hand = _hand(description.name, coupled(part), description.fingers)
         check_sense(hand)
+        if description.wrist is not None:
+            return replace(hand, wrist=_wrist(description.wrist))
         return hand if description.arm is None else _on_arm(hand, part, description.arm)
     except HandError as error:
         raise HandError(f"{description.name}: {error}") from error
@@ -193,6 +194,11 @@ def _hand(name: str, part: Part, fingers: tuple[FingerDescription, ...]) -> Hand
         lower=_frozen(part.model.lowerPositionLimit),
         upper=_frozen(part.model.upperPositionLimit),
     )
+
+
+def _wrist(description: WristDescription) -> Wrist:
+    nominal = placed(description.at, description.at_rotation_deg)
+    return Wrist(nominal, description.range, float(np.radians(description.turn_deg)))
 
 
 def _on_arm(hand: Hand, part: Part, description: ArmDescription) -> Hand:

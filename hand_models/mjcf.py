@@ -13,9 +13,9 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from hand_models.description import SourceDescription
 from hand_models.fields import HandError
 from hand_models.part import Coupling, Part
+from hand_models.sources import SourceDescription
 
 
 def read_mjcf(source: SourceDescription) -> Part:

@@ -16,10 +16,10 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from hand_models.assembly import read_part
-from hand_models.description import SourceDescription
 from hand_models.fields import HandError
 from hand_models.pads import GOOD, PadFit, measure_pad
 from hand_models.part import empty_part, grafted
+from hand_models.sources import SourceDescription
 
 Array = NDArray[np.float64]
 

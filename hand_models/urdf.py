@@ -6,9 +6,9 @@ import xml.etree.ElementTree as ElementTree
 
 import pinocchio as pin
 
-from hand_models.description import SourceDescription
 from hand_models.fields import HandError
 from hand_models.part import Coupling, Part
+from hand_models.sources import SourceDescription
 from hand_models.urdf_tree import keep_what_hangs_on, read_tree
 
 

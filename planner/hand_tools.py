@@ -84,6 +84,7 @@ class HandTools:
 @lru_cache(maxsize=8)
 def hand_tools(hand: Hand, options: ReachOptions) -> HandTools:
     """The tools of a hand under these rules; equal arguments give the same object."""
+    options = within_wrist(hand, options)
     alone = hand if hand.arm is None else hand.arm.hand
     postures, spheres, collision = posture_library(alone), link_spheres(alone), HandCollision(alone)
     reach_map = ReachMap(alone, postures, spheres, collision, cone=options.cone)
@@ -98,6 +99,15 @@ def hand_tools(hand: Hand, options: ReachOptions) -> HandTools:
         hand, rules, postures, link_spheres(hand), HandCollision(hand), reach_map,
         solver, single, ArmReach(hand.arm),
     )  # fmt: skip
+
+
+def within_wrist(hand: Hand, options: ReachOptions) -> ReachOptions:
+    """The rules, with the bounds of the hand's description where they name none."""
+    wrist = hand.wrist
+    if wrist is None or options.workspace.X_WB is not None:
+        return options
+    bounds = Workspace(wrist.X_WB, wrist.position_range, wrist.rotation_range)
+    return replace(options, workspace=bounds)
 
 
 def _with_arm(hand: Hand, arm: Arm) -> Hand:

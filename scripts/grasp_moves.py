@@ -12,6 +12,7 @@ from hand_models.hand import Hand
 from planner.explore import Step
 from planner.grasping.grasp import Grasp
 from planner.grasping.grasp_travel import GraspMotion, closing_motion
+from planner.hand_tools import within_wrist
 from planner.motions.round_motion import withdrawal
 from planner.motions.timing import MotionLimits
 from planner.motions.trajectory import Array, Configuration, Trajectory
@@ -28,7 +29,7 @@ HOME = pin.SE3(pin.rpy.rpyToMatrix(0.0, 1.2, 0.0), np.array([0.15, 0.0, 0.45]))
 def from_home(hand: Hand, options: PlannerOptions) -> PlannerOptions:
     """With the hand in the middle of its workspace, or between the robot and the object; with an
     arm where that begins."""
-    nominal = options.reach.workspace.X_WB
+    nominal = within_wrist(hand, options.reach).workspace.X_WB
     X_WB = hand.arm.X_WA if hand.arm is not None else HOME if nominal is None else nominal
     return replace(options, start=Configuration(hand.home, X_WB))
 

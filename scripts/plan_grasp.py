@@ -80,7 +80,7 @@ class Scenario:
 def main() -> int:
     options = tyro.cli(Options, description=__doc__)
     if options.describe_hand is not None:
-        return describe(DescribeOptions(options.describe_hand, out=options.out))
+        return describe(DescribeOptions(options.describe_hand, options.describe_base, options.out))
     console = Console()
     try:
         options = replace(options, sensor=sensor_in(options.world, options.sensor))
@@ -109,6 +109,10 @@ def _scenario(options: Options) -> Scenario:
     rng = np.random.default_rng(options.seed)
     surface = SurfaceOfRevolution(pose_in(options.world, rng), load_object(options.object))
     hand = load_hand(options.hand)
+    if options.wrist_mm is not None and hand.arm is not None:
+        raise ValueError(
+            f"--wrist-mm: {hand.name} is held by its arm; its description says where that stands"
+        )
     return Scenario(
         surface=surface,
         belief=belief_by(

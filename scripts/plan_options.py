@@ -22,6 +22,8 @@ class Options:
     """Hand: one of hand_models/hands, or the path of a description (.toml)."""
     describe_hand: Path | None = None
     """Instead of all this, propose a description of the hand in this URDF or MJCF, into --out."""
+    describe_base: str | None = None
+    """The link of it that is the palm, where the guess is wrong."""
     object: str = "can"
     """What is touched: a built-in name (can, bottle, cone, cup, barrel, jar-lid, knob, vase, egg,
     spindle, paper-lathe, sphere), a CSV file (r_mm,z_mm), a product's JSON or a mesh (stl, obj)."""
@@ -42,10 +44,10 @@ class Options:
     goal_offset_mm: float = 2.0
     """... and the position within this."""
     wrist_mm: tuple[float, float, float] | None = None
-    """Where the arm holds the hand base, in the world; the object stands near (500, 0, 200).
-    Not given, the arm reaches everywhere."""
+    """Where something holds the hand base, in the world; the object stands near (500, 0, 200).
+    Not given, as the hand's description says ([wrist] or [arm]), or else anywhere."""
     wrist_range_mm: float = 150.0
-    """How far from there, along each axis, the arm can go; it turns the hand any way."""
+    """How far from there, along each axis, it can go; it turns the hand any way."""
     obstacles: Path | None = None
     """A TOML file of a table and boxes that the hand must not meet (scripts/obstacle_file.py)."""
     budget: int = 15

@@ -100,6 +100,7 @@ def test_a_sphere_is_never_claimed_to_be_known(tmp_path):
         (("--view", "guess"), "is unknown; known are pose, cloud, box"),
         (("--wrist-mm", "nan", "0", "0"), "--wrist-mm: expected three finite numbers"),
         (("--wrist-mm", "0", "0", "0", "--wrist-range-mm", "-5"), "position_range"),
+        (("--hand", "allegro_right_ur5", "--wrist-mm", "0", "0", "0"), "is held by its arm"),
     ],
 )
 def test_bad_options_are_refused_and_nothing_is_written(arguments, message, tmp_path):

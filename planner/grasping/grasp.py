@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
@@ -26,7 +26,7 @@ from planner.grasping.grasp_motion import (
 from planner.grasping.grasp_options import GraspOptions
 from planner.grasping.grasp_outcome import Grasp, Hold, NoGrasp, closes_on, hold_on
 from planner.grasping.grasp_travel import GraspMotion, plan_grasp_motion
-from planner.hand_tools import HandTools, hand_tools
+from planner.hand_tools import HandTools, hand_tools, within_wrist
 from planner.motions.motion import Approach, plan_approaches
 from planner.motions.retreat import wall_95
 from planner.motions.transfer import movable_among
@@ -57,6 +57,7 @@ def plan_grasp(
         ValueError: Heights beside the object, or more fingers than the hand has.
     """
     options = options or GraspOptions()
+    options = replace(options, reach=within_wrist(hand, options.reach))
     tools = hand_tools(hand, options.reach)
     bodies = bodies_of(sample_objects(belief, options.objects, rng=rng))
     ranked, funnel = _ranked(tools, belief.surface, bodies, options, rng)
