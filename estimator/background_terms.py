@@ -8,7 +8,7 @@ import numpy as np
 
 from estimator.background import BASIS, ORIGIN, PRECISION, SIZE
 from estimator.chart import chart_at, line_of, nudged
-from estimator.compiled import V3, across, along, compiled, dot, vector
+from estimator.compiled import V3, across, along, compiled_part, dot, vector
 from estimator.problem import Problem, spread_of
 from estimator.readings import POSITION
 from estimator.vectors import Array
@@ -20,7 +20,7 @@ MISSED_ANYWAY = 0.2  # chance that a miss has another reason: an end, a dent, a 
 CHART_STEP = 1e-6
 
 
-@compiled
+@compiled_part
 def background_cost(problem: Problem, x: Array, derivatives: bool, work: Work) -> float:
     """All of it; derivatives are added to those in work."""
     if not problem.informed:
@@ -30,7 +30,7 @@ def background_cost(problem: Problem, x: Array, derivatives: bool, work: Work) -
     return cost + _miss_cost(problem, x, derivatives, work)
 
 
-@compiled
+@compiled_part
 def _location_cost(problem: Problem, x: Array, derivatives: bool, work: Work) -> float:
     """The line passes the contacts' centroid at a distance of about their spread, but contacts
     huddled on one side of a large object are not impossible: Student's t.
@@ -50,7 +50,7 @@ def _location_cost(problem: Problem, x: Array, derivatives: bool, work: Work) ->
     return 0.5 * (HEAVY + 2.0) * log(1.0 + dot(t, t) / square)
 
 
-@compiled
+@compiled_part
 def _prior_cost(problem: Problem, x: Array, derivatives: bool, work: Work) -> float:
     """Gaussian in the prior's chart; the Jacobian between charts by central differences."""
     row = problem.line
@@ -84,7 +84,7 @@ def _prior_cost(problem: Problem, x: Array, derivatives: bool, work: Work) -> fl
     return cost
 
 
-@compiled
+@compiled_part
 def _size_cost(problem: Problem, x: Array, derivatives: bool, work: Work) -> float:
     """Radius of each contact against the believed size; n contacts weigh as much as one."""
     a, u = line_of(x)
@@ -97,7 +97,7 @@ def _size_cost(problem: Problem, x: Array, derivatives: bool, work: Work) -> flo
     return cost
 
 
-@compiled
+@compiled_part
 def _pull(
     q: V3, u: V3, E1: V3, E2: V3, mean: float, weight: float, derivatives: bool, work: Work
 ) -> float:
@@ -116,7 +116,7 @@ def _pull(
     return squared
 
 
-@compiled
+@compiled_part
 def _miss_cost(problem: Problem, x: Array, derivatives: bool, work: Work) -> float:
     """Where a finger met nothing the line is farther away than radius plus pad, softly.
 

@@ -6,16 +6,16 @@ from math import sqrt
 
 import numpy as np
 
-from estimator.compiled import V3, across, along, compiled, dot, scaled
+from estimator.compiled import V3, across, along, compiled, compiled_part, dot, scaled
 from estimator.vectors import Array
 
 
-@compiled
+@compiled_part
 def line_of(x: Array) -> tuple[V3, V3]:
     return (x[0], x[1], x[2]), (x[3], x[4], x[5])
 
 
-@compiled
+@compiled_part
 def chart_at(point: V3, basis: tuple[V3, V3, V3], a: V3, u: V3) -> tuple[float, ...]:
     """(t1, t2, w1, w2) of a line in the chart at (point, basis[2]): see `estimator.axis`."""
     if dot(u, basis[2]) < 0.0:
@@ -34,7 +34,7 @@ def chart_at(point: V3, basis: tuple[V3, V3, V3], a: V3, u: V3) -> tuple[float, 
     return t1, t2, d1 * angle, d2 * angle
 
 
-@compiled
+@compiled_part
 def nudged(a: V3, u: V3, basis: tuple[V3, V3], j: int, h: float) -> tuple[V3, V3]:
     if j < 2:
         return along(a, h, basis[j]), u
@@ -58,7 +58,7 @@ def stepped(x: Array, step: Array, origin: V3, out: Array) -> None:
         out[k] = x[k] + step[k - 2]
 
 
-@compiled
+@compiled_part
 def separation(x: Array, other: Array, information: Array) -> float:
     """Squared distance of two lines in the chart at the first, in standard deviations."""
     a, u = line_of(x)

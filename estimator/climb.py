@@ -6,7 +6,7 @@ import numpy as np
 
 from estimator.background import ORIGIN
 from estimator.chart import stepped
-from estimator.compiled import compiled, vector
+from estimator.compiled import compiled_part, vector
 from estimator.linear import factor, solve_factored
 from estimator.posterior import cost_at
 from estimator.problem import Problem, spread_of
@@ -17,7 +17,7 @@ LARGEST_TURN = 0.3  # of one step [rad]
 LARGEST_SHIFT = 1.5  # of one step, in spreads
 
 
-@compiled
+@compiled_part
 def solve_lifted(work: Work, damping: float, spread: float) -> None:
     """work.step = -(F + damping (diag F + 1))^-1 gradient, lengths of the line in spreads."""
     P = len(work.gradient)
@@ -36,7 +36,7 @@ def solve_lifted(work: Work, damping: float, spread: float) -> None:
         y[j] *= (spread if j < 2 else 1.0) / longest
 
 
-@compiled
+@compiled_part
 def climb(problem: Problem, x: Array, iterations: int, gain_at_rest: float, work: Work) -> float:
     """Fisher scoring with Levenberg's damping; x becomes the peak, work holds its derivatives.
 

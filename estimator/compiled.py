@@ -11,8 +11,8 @@ from __future__ import annotations
 import hashlib
 import os
 import sys
-from collections.abc import Callable
-from functools import lru_cache
+from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -44,27 +44,63 @@ def compiled(function: F) -> F:
 
     Sums may be contracted and reordered, infinities and NaN keep their meaning.
     """
+    return _compiled(function, from_python=True)
+
+
+def compiled_part(function: F) -> F:
+    """The same for what only compiled functions call: it takes a third less time to compile.
+
+    Raises:
+        TypeError: When Python calls it.
+    """
+    found: Any = _compiled(function, from_python=False)
+    found._insert = lambda *_: None  # no code of it is entered from Python, there is no way in
+    found._compile_for_args = partial(_refuse, function)
+    return cast(F, found)
+
+
+def _refuse(function: Callable[..., Any], *_: Any, **__: Any) -> None:
+    name = f"{function.__module__}.{function.__qualname__}"
+    raise TypeError(f"{name} is a part of compiled functions; Python may call what is @compiled")
+
+
+def _compiled(function: F, *, from_python: bool) -> F:
     package = sys.modules[function.__module__.partition(".")[0]]
     other = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(_folder(Path(str(package.__file__)).parent))  # read by the next
     try:
-        return cast(F, numba.njit(cache=True, error_model="numpy", fastmath=FAST)(function))
+        found = numba.njit(
+            cache=True, error_model="numpy", fastmath=FAST,
+            no_cfunc_wrapper=True, no_cpython_wrapper=not from_python,
+        )(function)  # fmt: skip
     finally:
         numba.config.CACHE_DIR = other
+    found.get_call_template = _for_any_constant(found.get_call_template)
+    return cast(F, found)
 
 
-@compiled
+def _for_any_constant(template: Callable[..., Any]) -> Callable[..., Any]:
+    """numba would compile a function once more for every constant that another calls it with."""
+
+    def general(args: Sequence[Any], kws: Mapping[str, Any]) -> Any:
+        plain = {name: numba.types.unliteral(kind) for name, kind in kws.items()}
+        return template([numba.types.unliteral(kind) for kind in args], plain)
+
+    return general
+
+
+@compiled_part
 def vector(row: Array, first: int) -> V3:
     """Three numbers of a row."""
     return (row[first], row[first + 1], row[first + 2])
 
 
-@compiled
+@compiled_part
 def dot(a: V3, b: V3) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@compiled
+@compiled_part
 def cross3(a: V3, b: V3) -> V3:
     return (
         a[1] * b[2] - a[2] * b[1],
@@ -73,7 +109,7 @@ def cross3(a: V3, b: V3) -> V3:
     )
 
 
-@compiled
+@compiled_part
 def along(a: V3, s: float, b: V3) -> V3:
     """a + s b."""
     return (a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2])
@@ -84,7 +120,7 @@ def scaled(s: float, a: V3) -> V3:
     return (s * a[0], s * a[1], s * a[2])
 
 
-@compiled
+@compiled_part
 def across(u: V3) -> tuple[V3, V3]:
     """`estimator.vectors.basis_across` of one unit vector."""
     x, y, z = abs(u[0]), abs(u[1]), abs(u[2])

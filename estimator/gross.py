@@ -6,7 +6,7 @@ from math import exp, log, pi, sqrt
 
 import numpy as np
 
-from estimator.compiled import compiled
+from estimator.compiled import compiled_part
 from estimator.likelihood import Fit
 from estimator.readings import EDGE, KAPPA, SD_K_TT
 from estimator.vectors import Array
@@ -14,7 +14,7 @@ from estimator.vectors import Array
 LOG_2PI = log(2.0 * pi)
 
 
-@compiled
+@compiled_part
 def gross_errors(row: Array, fit: Fit, gross: float) -> tuple[float, float, float]:
     """Log density of a contact that is grossly wrong with probability `gross`, half of the time in
     its directions and curvatures, half of the time altogether; and the probabilities that it is

@@ -36,7 +36,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from estimator.compiled import compiled
+from estimator.compiled import compiled, compiled_part
 from estimator.readings import (
     CENSORED,
     COVARIANCE,
@@ -119,7 +119,7 @@ def fit_of(row: Array, seen: Seen, scale: float, lean: Array) -> Fit:
     return Fit(a, b, c, l11, l21, l22, l31, l32, l33, w, v, curve, g, K, F_g, F_K, log_density)
 
 
-@compiled
+@compiled_part
 def _fill_lean(row: Array, seen: Seen, w: float, curve: float, lean: Array) -> None:
     """Sigma L^T, whose rows L are in the head of this file."""
     beta, K_tz = -seen.m_n / seen.r, -w * seen.m_u / seen.r
@@ -135,7 +135,7 @@ def _fill_lean(row: Array, seen: Seen, w: float, curve: float, lean: Array) -> N
         lean[2, j] += row[k + 5] + seen.c2 * row[k + 6] + seen.s2 * row[k + 7]
 
 
-@compiled
+@compiled_part
 def _last_row(seen: Seen, curve: float, S: Array) -> float:
     """Last row of L, without F_g, times a column of Sigma L^T."""
     out = seen.m_n * S[2] - seen.m_u * (seen.c * S[1] - seen.s * S[0])
@@ -145,7 +145,7 @@ def _last_row(seen: Seen, curve: float, S: Array) -> float:
     return product
 
 
-@compiled
+@compiled_part
 def _curvature_gap(
     row: Array, g: float, K: float, censored: bool
 ) -> tuple[float, float, float, float]:
@@ -186,7 +186,7 @@ class Weights(NamedTuple):
     cc: float
 
 
-@compiled
+@compiled_part
 def _weights(fit: Fit, trust: float, normal_only: float) -> Weights:
     """For a contact that is right with probability `trust`, its normal alone `normal_only`."""
     m11, m22, m33 = 1.0 / fit.l11, 1.0 / fit.l22, 1.0 / fit.l33  # M = L^-1
@@ -210,7 +210,7 @@ def _weights(fit: Fit, trust: float, normal_only: float) -> Weights:
     )
 
 
-@compiled
+@compiled_part
 def _weigh(W: Weights, F_g: float, lean: Array) -> None:
     """lean becomes 2 W L Sigma, so that <W, dC> = <dL, lean>."""
     for j in range(ERRORS):
@@ -220,7 +220,7 @@ def _weigh(W: Weights, F_g: float, lean: Array) -> None:
         lean[2, j] = F_g * (W.bc * b + W.xc * x + W.cc * c)
 
 
-@compiled
+@compiled_part
 def _slopes(row: Array, seen: Seen, fit: Fit, W: Weights, T: Array, trust: float) -> Slopes:
     """Derivatives of -log density; T as `_weigh` leaves it."""
     c, s, r, g, F_g = seen.c, seen.s, seen.r, fit.g, fit.F_g
@@ -249,7 +249,7 @@ def _slopes(row: Array, seen: Seen, fit: Fit, W: Weights, T: Array, trust: float
     )
 
 
-@compiled
+@compiled_part
 def fill_derivatives(
     row: Array, seen: Seen, fit: Fit, trust: float, normal_only: float, lean: Array,
     gradient: Array, fisher: Array, rows: Array, locals_: int,

@@ -6,11 +6,11 @@ from math import log, sqrt
 
 import numpy as np
 
-from estimator.compiled import compiled
+from estimator.compiled import compiled_part
 from estimator.vectors import Array
 
 
-@compiled
+@compiled_part
 def factor(A: Array, L: Array) -> float:
     """Cholesky factor L of A (lower triangles), pivots kept positive; returns log det A."""
     log_det = 0.0
@@ -28,7 +28,7 @@ def factor(A: Array, L: Array) -> float:
     return log_det
 
 
-@compiled
+@compiled_part
 def solve_factored(L: Array, y: Array) -> None:
     """y becomes A^-1 y."""
     P = len(y)
@@ -42,7 +42,7 @@ def solve_factored(L: Array, y: Array) -> None:
         y[j] /= L[j, j]
 
 
-@compiled
+@compiled_part
 def inverse(A: Array, out: Array, L: Array) -> None:
     """out becomes the inverse of a positive definite A (lower triangle in, whole matrix out)."""
     factor(A, L)
@@ -52,7 +52,7 @@ def inverse(A: Array, out: Array, L: Array) -> None:
         solve_factored(L, out[j])
 
 
-@compiled
+@compiled_part
 def marginal(A: Array) -> Array:
     """The first four states' information, all others marginalised (lower triangle in, whole out).
 

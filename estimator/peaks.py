@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from estimator.chart import line_of, separation
-from estimator.compiled import across, compiled
+from estimator.compiled import across, compiled_part
 from estimator.linear import factor, inverse, marginal
 from estimator.posterior import contacts_cost, cost_at
 from estimator.problem import Problem, place, spread_of, states_of
@@ -37,7 +37,7 @@ class Peaks(NamedTuple):
     tally: Array
 
 
-@compiled
+@compiled_part
 def evidence_of(problem: Problem, x: Array, work: Work) -> float:
     """Negative log of Laplace's evidence, up to what all peaks share."""
     cost = cost_at(problem, x, True, work)
@@ -45,13 +45,13 @@ def evidence_of(problem: Problem, x: Array, work: Work) -> float:
     return cost + 0.5 * factor(work.fisher, work.lifted)
 
 
-@compiled
+@compiled_part
 def _add_finite_volume(problem: Problem, fisher: Array, shift: float, turn: float) -> None:
     for j in range(4):
         fisher[j, j] += (shift * spread_of(problem)) ** -2 if j < 2 else turn**-2
 
 
-@compiled
+@compiled_part
 def describe(problem: Problem, peaks: Peaks, k: int, work: Work) -> None:
     """Fill what is said of peak k, whose state is known."""
     x = peaks.x[k]
@@ -63,7 +63,7 @@ def describe(problem: Problem, peaks: Peaks, k: int, work: Work) -> None:
     _contacts_alone(problem, peaks, k, work)
 
 
-@compiled
+@compiled_part
 def _contacts_alone(problem: Problem, peaks: Peaks, k: int, work: Work) -> None:
     """What the contacts and the nuisance states' priors say of the line, without its own prior."""
     x, P = peaks.x[k], len(work.gradient)
@@ -84,7 +84,7 @@ def _contacts_alone(problem: Problem, peaks: Peaks, k: int, work: Work) -> None:
             peaks.contacts[k, j, m] = information[j, m]
 
 
-@compiled
+@compiled_part
 def _parallel_row(problem: Problem, i: int, x: Array, covariance: Array, work: Work) -> float:
     """Probability that row 0 is nearer to the parallel, theta being known as well as the line."""
     contact = problem.contacts[i]
@@ -106,7 +106,7 @@ def _parallel_row(problem: Problem, i: int, x: Array, covariance: Array, work: W
     return 0.5 * (1.0 + erf((0.25 * pi - folded) / sqrt(2.0 * max(total, 1e-18))))
 
 
-@compiled
+@compiled_part
 def leader_of(peaks: Peaks, k: int, leader: Index) -> int:
     """The first peak within SAME_AXIS of this one: together they are one hypothesis."""
     both, information, L = np.zeros((4, 4)), np.zeros((4, 4)), np.zeros((4, 4))

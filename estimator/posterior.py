@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from estimator.background_terms import background_cost
 from estimator.chart import line_of
-from estimator.compiled import across, compiled
+from estimator.compiled import across, compiled, compiled_part
 from estimator.gross import gross_errors
 from estimator.likelihood import Fit, fill_derivatives, fit_of
 from estimator.problem import Problem, place, states_of
@@ -54,7 +54,7 @@ def contacts_cost(problem: Problem, x: Array, derivatives: bool, work: Work) -> 
     return cost
 
 
-@compiled
+@compiled_part
 def _add_to_tally(row: Array, fit: Fit, trust: float, normal_only: float, tally: Array) -> None:
     """Squared residuals and their number: gross errors left out, and all."""
     turned = fit.b**2 + fit.c**2
@@ -65,7 +65,7 @@ def _add_to_tally(row: Array, fit: Fit, trust: float, normal_only: float, tally:
     tally[3] += 1.0 + readable
 
 
-@compiled
+@compiled_part
 def _scatter(problem: Problem, i: int, work: Work, locals_: int) -> None:
     for j in range(locals_):
         J = place(problem, i, j)

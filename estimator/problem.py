@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from estimator.assumptions import Assumptions
 from estimator.background import SPREAD, Background, background_of
-from estimator.compiled import V3, compiled
+from estimator.compiled import V3, compiled, compiled_part
 from estimator.contact import Miss
 from estimator.nuisances import Nuisances, Owner, State, nuisance_states, nuisances_of
 from estimator.prior import AxisPrior
@@ -56,7 +56,7 @@ def problem_at(problems: Problems, s: int) -> Problem:
     )
 
 
-@compiled
+@compiled_part
 def trusting(problem: Problem) -> Problem:
     """The same without gross errors."""
     return Problem(
@@ -71,13 +71,13 @@ def trusting(problem: Problem) -> Problem:
     )
 
 
-@compiled
+@compiled_part
 def spread_of(problem: Problem) -> float:
     spread: float = problem.line[SPREAD]
     return spread
 
 
-@compiled
+@compiled_part
 def states_of(problem: Problem, i: int, x: Array) -> tuple[float, float, V3]:
     """delta, lambda and position bias of contact i."""
     delta, scale, bias = 0.0, 0.0, (0.0, 0.0, 0.0)
@@ -92,7 +92,7 @@ def states_of(problem: Problem, i: int, x: Array) -> tuple[float, float, V3]:
     return delta, scale, bias
 
 
-@compiled
+@compiled_part
 def place(problem: Problem, i: int, j: int) -> int:
     """Parameter of the whole problem that is parameter j of contact i; -1 for none."""
     if j < 4:

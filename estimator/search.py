@@ -9,7 +9,7 @@ import numpy as np
 from estimator.background import ORIGIN
 from estimator.chart import separation, stepped
 from estimator.climb import climb
-from estimator.compiled import compiled, vector
+from estimator.compiled import compiled_part, vector
 from estimator.linear import marginal
 from estimator.posterior import cost_at
 from estimator.problem import Problem, trusting
@@ -40,7 +40,7 @@ class Bench(NamedTuple):
     rough_cost: Array  # (MOST_PEAKS,)
 
 
-@compiled
+@compiled_part
 def bench(most: int, D: int) -> Bench:
     return Bench(
         np.zeros((most, 6)),
@@ -52,7 +52,7 @@ def bench(most: int, D: int) -> Bench:
     )
 
 
-@compiled
+@compiled_part
 def find_peaks(
     problem: Problem, extra: Array, room: Bench, work: Work, peaks: Array, costs: Array
 ) -> int:
@@ -77,7 +77,7 @@ def find_peaks(
     return kept
 
 
-@compiled
+@compiled_part
 def _climb_all(problem: Problem, room: Bench, count: int, work: Work) -> int:
     """Rough climbs from every start that is not on its way to a known peak."""
     found, least = 0, room.costs[room.order[0]]
@@ -93,7 +93,7 @@ def _climb_all(problem: Problem, room: Bench, count: int, work: Work) -> int:
     return found
 
 
-@compiled
+@compiled_part
 def _start(problem: Problem, room: Bench, count: int, work: Work) -> None:
     """Seeds as states with every nuisance zero, and their costs."""
     origin = vector(problem.line, ORIGIN)
@@ -107,7 +107,7 @@ def _start(problem: Problem, room: Bench, count: int, work: Work) -> None:
         room.costs[k] = _finite(cost_at(problem, x, False, work))
 
 
-@compiled
+@compiled_part
 def _first_steps(problem: Problem, room: Bench, count: int, work: Work) -> int:
     """A few steps from the cheapest seeds; `order` then has those worth the whole climb first."""
     order, costs = room.order, room.costs
@@ -121,12 +121,12 @@ def _first_steps(problem: Problem, room: Bench, count: int, work: Work) -> int:
     return min(count, MOST_STARTS)
 
 
-@compiled
+@compiled_part
 def _finite(cost: float) -> float:
     return cost if np.isfinite(cost) else _NEVER
 
 
-@compiled
+@compiled_part
 def _on_the_way(problem: Problem, x: Array, kept: Array, count: int, work: Work) -> bool:
     """Whether a start has come so near to a peak already found that it would end there too."""
     cost_at(problem, x, True, work)
@@ -137,7 +137,7 @@ def _on_the_way(problem: Problem, x: Array, kept: Array, count: int, work: Work)
     return nearest < SAME_AXIS**2
 
 
-@compiled
+@compiled_part
 def _keep(x: Array, cost: float, work: Work, kept: Array, costs: Array, count: int) -> int:
     """Add a peak to those kept unless it is one of them; the cheaper of two equals stays."""
     if not np.isfinite(cost):
@@ -163,7 +163,7 @@ def _keep(x: Array, cost: float, work: Work, kept: Array, costs: Array, count: i
     return count
 
 
-@compiled
+@compiled_part
 def sort_into(values: Array, count: int, order: Index) -> None:
     """order[:count] sorts values[:count]; by insertion, for the few there are."""
     for k in range(count):

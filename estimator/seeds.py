@@ -10,7 +10,7 @@ from math import sqrt
 import numpy as np
 
 from estimator.background import BASIS, ORIGIN
-from estimator.compiled import V3, across, along, compiled, cross3, dot, scaled, vector
+from estimator.compiled import V3, across, along, compiled_part, cross3, dot, scaled, vector
 from estimator.linear import factor, solve_factored
 from estimator.problem import Problem, spread_of
 from estimator.readings import K0, K1, NORMAL, POSITION, VOID, Readings
@@ -22,13 +22,13 @@ NEARLY_PARALLEL = 0.03  # sine of two planes' angle below which they give no lin
 COMPLEX = 5  # normals from which a linear complex is fitted
 
 
-@compiled
+@compiled_part
 def most_seeds(n: int) -> int:
     fan = min(n, FAN)
     return 4 * min(n * (n - 1) // 2, MOST_PAIRS) + 2 * fan + fan * (fan - 1) // 2 + 5
 
 
-@compiled
+@compiled_part
 def seed_lines(problem: Problem, extra: Array, seeds: Array) -> int:
     """Fill seeds (M, 6) with points and unit directions, `extra` (E, 6) among them; how many.
 
@@ -47,7 +47,7 @@ def seed_lines(problem: Problem, extra: Array, seeds: Array) -> int:
     return _fan(problem, seeds, count)
 
 
-@compiled
+@compiled_part
 def _pair_lines(problem: Problem, seeds: Array) -> int:
     contacts, origin = problem.contacts, vector(problem.line, ORIGIN)
     n = len(contacts)
@@ -70,7 +70,7 @@ def _pair_lines(problem: Problem, seeds: Array) -> int:
     return count
 
 
-@compiled
+@compiled_part
 def _meet(one: Array, first: int, other: Array, second: int, origin: V3, seed: Array) -> bool:
     """Where the plane across direction `first` of one contact meets that of the other, nearest to
     the origin; false where the planes are nearly parallel."""
@@ -86,7 +86,7 @@ def _meet(one: Array, first: int, other: Array, second: int, origin: V3, seed: A
     return True
 
 
-@compiled
+@compiled_part
 def _fan(problem: Problem, seeds: Array, count: int) -> int:
     """Through the point the normals pass nearest: measured directions, and normals' products."""
     contacts = problem.contacts
@@ -106,13 +106,13 @@ def _fan(problem: Problem, seeds: Array, count: int) -> int:
     return count
 
 
-@compiled
+@compiled_part
 def _write(seed: Array, point: V3, u: V3) -> None:
     seed[0], seed[1], seed[2] = point
     seed[3], seed[4], seed[5] = u
 
 
-@compiled
+@compiled_part
 def _point_beside(contacts: Array, u: V3, point: V3) -> V3:
     """Where the line along u passes the normals' lines nearest; near `point` where they do not say.
 
@@ -130,7 +130,7 @@ def _point_beside(contacts: Array, u: V3, point: V3) -> V3:
     return along(along(point, (g22 * h1 - g12 * h2) / det, E1), (g11 * h2 - g12 * h1) / det, E2)
 
 
-@compiled
+@compiled_part
 def _meeting_point(problem: Problem) -> V3:
     """The point that the normals' lines pass nearest; where parallel, near the contacts."""
     contacts, origin = problem.contacts, vector(problem.line, ORIGIN)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimator.compiled import compiled
+from estimator.compiled import compiled_part
 from estimator.readings import CONVEX
 from estimator.sight import MN, MU, Seen
 from estimator.vectors import Array
@@ -12,7 +12,7 @@ from estimator.vectors import Array
 INSIDE = 0.05  # softness of "the axis lies behind the surface", on n . rad
 
 
-@compiled
+@compiled_part
 def add_constraints(
     row: Array, seen: Seen, slope: float, derivatives: bool,
     gradient: Array, fisher: Array, rows: Array, locals_: int,

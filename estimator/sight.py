@@ -16,7 +16,7 @@ from __future__ import annotations
 from math import cos, sin, sqrt
 from typing import NamedTuple
 
-from estimator.compiled import V3, along, compiled, cross3, dot, scaled, vector
+from estimator.compiled import V3, along, compiled, compiled_part, cross3, dot, scaled, vector
 from estimator.readings import K0, K1, NORMAL, POSITION
 from estimator.vectors import Array
 
@@ -59,7 +59,7 @@ def seen_from(row: Array, a: V3, u: V3, bias: V3, delta: float) -> Seen:
     return Seen(r, dot(q, u), e, rad, dot(n, e), dot(n, rad), dot(n, u), c, s, c2, s2)
 
 
-@compiled
+@compiled_part
 def fill_motions(seen: Seen, E1: V3, E2: V3, rows: Array, locals_: int) -> None:
     """How A, B, C, R, beta, m_n, m_u and theta move with the parameters, into rows (8, 9)."""
     for k in range(4):

@@ -17,7 +17,7 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.compiled import compiled
+from estimator.compiled import compiled, compiled_part
 from estimator.vectors import Array, Index
 
 LOWER = np.tril_indices(5)  # how a symmetric 5x5 matrix is packed
@@ -108,7 +108,7 @@ def _fill_scores(
             out[t] /= 2.0 * len(J)
 
 
-@compiled
+@compiled_part
 def _trace(m: Array, admitted: float, untold: float) -> float:
     """Trace of the 4x4 block of the inverse of a packed 5x5 matrix, and the squared bias.
 

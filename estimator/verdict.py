@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import chdtrc
 
-from estimator.compiled import V3, along, compiled, dot, scaled, vector
+from estimator.compiled import V3, along, compiled, compiled_part, dot, scaled, vector
 from estimator.modes import Modes
 from estimator.readings import (
     EDGE,
@@ -173,7 +173,7 @@ def _fill_one_plane(readings: Readings, turns: Array, statistic: Array) -> None:
                     statistic[s] = min(statistic[s], found)
 
 
-@compiled
+@compiled_part
 def _one_plane(readings: Readings, s: int, first: int, row: int, turn: float) -> float:
     """Chi-square of one common plane, where `row` of contact `first` is across it.
 
@@ -207,7 +207,7 @@ def _one_plane(readings: Readings, s: int, first: int, row: int, turn: float) ->
     return total
 
 
-@compiled
+@compiled_part
 def _turned(contact: Array, row: int, turn: float) -> V3:
     """A measured direction, turned back about the normal."""
     k0, k1 = vector(contact, K0), vector(contact, K1)
@@ -216,7 +216,7 @@ def _turned(contact: Array, row: int, turn: float) -> V3:
     return along(scaled(cos(turn), k1), sin(turn), k0)
 
 
-@compiled
+@compiled_part
 def _nearest(contact: Array, reference: V3, turn: float) -> V3:
     """The one of its two directions that is nearer to the reference."""
     first, second = _turned(contact, 0, turn), _turned(contact, 1, turn)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from estimator.compiled import compiled
+from estimator.compiled import compiled, compiled_part
 from estimator.readings import ERRORS
 from estimator.sight import LOCAL
 from estimator.vectors import Array
@@ -49,13 +49,13 @@ def work_space(parameters: int, contacts: int) -> Work:
     )
 
 
-@compiled
+@compiled_part
 def copied(x: Array, out: Array) -> None:
     for k in range(len(x)):
         out[k] = x[k]
 
 
-@compiled
+@compiled_part
 def remember(work: Work) -> None:
     """Keep gradient and information while a step is tried."""
     copied(work.gradient, work.kept_gradient)
@@ -63,7 +63,7 @@ def remember(work: Work) -> None:
         copied(work.fisher[j], work.kept_fisher[j])
 
 
-@compiled
+@compiled_part
 def recall(work: Work) -> None:
     """Take them back after a step that failed."""
     copied(work.kept_gradient, work.gradient)

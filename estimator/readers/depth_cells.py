@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimator.compiled import compiled
+from estimator.compiled import compiled, compiled_part
 from estimator.vectors import Array
 
 MEAN, X, Y, COUNT = 0, 1, 2, 3  # layers of cells
@@ -47,7 +47,7 @@ def pool(image: Array, pitch: float, m: int, cells: Array) -> tuple[float, int]:
     return deepest, same
 
 
-@compiled
+@compiled_part
 def deepest_cell(cells: Array) -> tuple[int, int, float]:
     """Row, column and depth [mm] of the deepest cell, averaged over its neighbours (one noisy
     cell is no peak); depth -inf where every pixel is dead."""
@@ -68,7 +68,7 @@ def deepest_cell(cells: Array) -> tuple[int, int, float]:
     return bi, bj, best
 
 
-@compiled
+@compiled_part
 def flood(cells: Array, i: int, j: int, level: float, label: int, labels: Array) -> int:
     """Label the cells deeper than `level` that hang together with cell i, j; their number."""
     h, w = labels.shape
@@ -91,7 +91,7 @@ def flood(cells: Array, i: int, j: int, level: float, label: int, labels: Array)
     return size
 
 
-@compiled
+@compiled_part
 def other_blob(cells: Array, level: float, labels: Array) -> int:
     """Size in cells of the largest blob deeper than `level` that is not yet labelled."""
     largest, label = 0, 2

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimator.compiled import compiled
+from estimator.compiled import compiled_part
 from estimator.readers.depth_cells import COUNT, MEAN, X, Y
 from estimator.readers.depth_fit import TERMS, beyond_quadratic, dome, row_of
 from estimator.readers.depth_noise import two_variances
@@ -25,7 +25,7 @@ _UNSEEN = 2.0
 _LIKELY, _SPREAD = 1.3, 0.6  # of those: [mm], sd of the logarithm
 
 
-@compiled
+@compiled_part
 def smooth_moment(
     cells: Array, inside: Mask, centre: Array, side: float, pixels: int, length: float, B: Array
 ) -> None:
@@ -68,7 +68,7 @@ def smooth_moment(
             B[n, k] = B[k, n]
 
 
-@compiled
+@compiled_part
 def _box(inside: Mask, G: int) -> tuple[int, int, int, int]:
     """Rows and columns of the domain, first and past the last, in blocks of G cells."""
     low_i, high_i, low_j, high_j = inside.shape[0], 0, inside.shape[1], 0
@@ -80,7 +80,7 @@ def _box(inside: Mask, G: int) -> tuple[int, int, int, int]:
     return low_i // G, high_i // G + 1, low_j // G, high_j // G + 1
 
 
-@compiled
+@compiled_part
 def _kernel(n: int, scale: float, step: float) -> Array:
     """Correlation along one axis of cells k apart, scale exp(-step k^2), as a matrix (n, n)."""
     values, out = np.empty(n), np.empty((n, n))
@@ -92,7 +92,7 @@ def _kernel(n: int, scale: float, step: float) -> Array:
     return out
 
 
-@compiled
+@compiled_part
 def residuals(
     cells: Array, inside: Mask, radius: float, centre: Array, terms: Array, out: Array
 ) -> float:
@@ -114,7 +114,7 @@ def residuals(
     return square / weight
 
 
-@compiled
+@compiled_part
 def trace_product(A: Array, B: Array) -> float:
     s = 0.0
     for i in range(A.shape[0]):
@@ -123,7 +123,7 @@ def trace_product(A: Array, B: Array) -> float:
     return s
 
 
-@compiled
+@compiled_part
 def expected_square(
     cells: Array, inside: Mask, inv: Array, B: Array, side: float, pixels: int, noise: Array
 ) -> float:
@@ -140,7 +140,7 @@ def expected_square(
     return float(noise[0] ** 2 * max(n - TERMS, 1) / weight + noise[1] ** 2 * smooth)
 
 
-@compiled
+@compiled_part
 def noise_of_residuals(
     cells: Array,
     inside: Mask,

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimator.compiled import compiled
+from estimator.compiled import compiled, compiled_part
 from estimator.readers.depth_cells import COUNT, MEAN, X, Y
 from estimator.vectors import Array, Mask
 
@@ -30,7 +30,7 @@ _FLATTEST = 1.0 / 400.0  # of kappa_a / kappa_b, for the length of a line contac
 ROUNDS = 6
 
 
-@compiled
+@compiled_part
 def dome(x: float, y: float, radius: float) -> float:
     """Height of the undeformed pad over its apex [mm]; falls away from it."""
     if not np.isfinite(radius):
@@ -52,7 +52,7 @@ def dome_terms(x: float, y: float, radius: float, terms: Array) -> None:
         terms[5] = -1.0 / s - y * y / s**3
 
 
-@compiled
+@compiled_part
 def beyond_quadratic(x: float, y: float, t: Array) -> float:
     """Third and fourth order of a body whose sections are arcs."""
     hx, hy = t[3] * x + t[4] * y, t[4] * x + t[5] * y
@@ -61,13 +61,13 @@ def beyond_quadratic(x: float, y: float, t: Array) -> float:
     return float(0.5 * bend * (t[1] * x + t[2] * y + 0.5 * q))
 
 
-@compiled
+@compiled_part
 def row_of(x: float, y: float, row: Array) -> None:
     row[0], row[1], row[2] = 1.0, x, y
     row[3], row[4], row[5] = 0.5 * x * x, x * y, 0.5 * y * y
 
 
-@compiled
+@compiled_part
 def inverse(A: Array, out: Array) -> bool:
     """Inverse of a small symmetric matrix by Cholesky; False where it is not positive."""
     n = A.shape[0]
@@ -170,7 +170,7 @@ def fit_once(points: Array, n: int, centre: Array, terms: Array, inv: Array) -> 
     return True
 
 
-@compiled
+@compiled_part
 def semi_axes(along: float, across: float, delta: float, longest: float) -> tuple[float, float]:
     """a, b of the contact; one that outgrows the pad is as long as that, and as deep."""
     t, a, b = min(max(along / across, _FLATTEST), 1.0), 0.0, 0.0
@@ -184,7 +184,7 @@ def semi_axes(along: float, across: float, delta: float, longest: float) -> tupl
     return a, min(a, b)
 
 
-@compiled
+@compiled_part
 def ellipse_of(terms: Array, radius: float, centre: Array, longest: float, ellipse: Array) -> bool:
     """Write (x, y, cos, sin, a, b, delta) of the Hertz ellipse; False where the fit is not convex.
 
@@ -213,7 +213,7 @@ def ellipse_of(terms: Array, radius: float, centre: Array, longest: float, ellip
     return True
 
 
-@compiled
+@compiled_part
 def domain(
     cells: Array, ellipse: Array, radius: float, inside: Mask, points: Array, centre: Array
 ) -> int:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.fft import dctn, idctn
 
-from estimator.compiled import compiled
+from estimator.compiled import compiled, compiled_part
 from estimator.readers.depth import images_of, require_positive
 from estimator.readers.depth_cells import COUNT, MEAN, X, Y, pool
 from estimator.readers.depth_covariance import smooth_moment, trace_product
@@ -111,7 +111,7 @@ def _depth_of(slopes: Array, pitch: float, radius: float) -> Array:
     return np.asarray(depth)
 
 
-@compiled
+@compiled_part
 def _slope_beyond(x: float, y: float, t: Array) -> tuple[float, float]:
     """Gradient of `depth_fit.beyond_quadratic`."""
     hx, hy = t[3] * x + t[4] * y, t[4] * x + t[5] * y
@@ -121,7 +121,7 @@ def _slope_beyond(x: float, y: float, t: Array) -> tuple[float, float]:
     return out_x, (t[4] * hx + t[5] * hy) * lift + bend * (t[2] + 0.5 * hy)
 
 
-@compiled
+@compiled_part
 def _fit_slopes(
     cx: Array, cy: Array, inside: Mask, centre: Array, terms: Array, M: Array, inv: Array
 ) -> tuple[bool, float]:
@@ -165,7 +165,7 @@ def _fit_slopes(
     return True, square / weight
 
 
-@compiled
+@compiled_part
 def _assemble(M: Array, out: Array) -> None:
     """Moments of the five from those of (1, x, y), which both slopes share."""
     out[:] = 0.0

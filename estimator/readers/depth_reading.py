@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimator.compiled import compiled
+from estimator.compiled import compiled, compiled_part
 from estimator.readers.depth_cells import COUNT, MEAN, X, Y, deepest_cell, flood, other_blob, pool
 from estimator.readers.depth_covariance import (
     expected_square,
@@ -42,12 +42,12 @@ POOR_RATIO = 1.6  # residual over noise
 _DOUBT = 9.0  # on variances, where a flag says that the fit may not be the object
 
 
-@compiled
+@compiled_part
 def _is_clipped(same: int, blob: int, pixels: int) -> bool:
     return same > 8 and same > _PLATEAU * blob * pixels * pixels
 
 
-@compiled
+@compiled_part
 def leaves_image(hertz: Array, half_width: float, half_height: float) -> bool:
     """Whether the contact ellipse, a tenth larger, reaches beyond the image."""
     x, y, c, s, a, b = hertz[0], hertz[1], hertz[2], hertz[3], hertz[4], hertz[5]
@@ -55,7 +55,7 @@ def leaves_image(hertz: Array, half_width: float, half_height: float) -> bool:
     return bool(abs(x) + wide > half_width or abs(y) + high > half_height)
 
 
-@compiled
+@compiled_part
 def locate(cells: Array, deepest: float, same: int, pixels: int, least: float, inside: Mask) -> int:
     """Flags of where the contact is; `inside` becomes the cells that surely belong to it."""
     i, j, peak = deepest_cell(cells)
@@ -80,7 +80,7 @@ def locate(cells: Array, deepest: float, same: int, pixels: int, least: float, i
     return flags
 
 
-@compiled
+@compiled_part
 def fit_domain(
     cells: Array,
     radius: float,
@@ -109,7 +109,7 @@ def fit_domain(
     return 0
 
 
-@compiled
+@compiled_part
 def place_only(cells: Array, radius: float, centre: Array, terms: Array) -> None:
     """Of a contact too small to fit: its deepest cell, the pad's own slope, no curvature."""
     i, j, peak = deepest_cell(cells)
@@ -143,7 +143,7 @@ def covariance_into(
             out[i, j] = noise[0] ** 2 * inv[i, j] + noise[1] ** 2 * s
 
 
-@compiled
+@compiled_part
 def domain_spread(terms: Array, covariance: Array, radius: float, centre: Array) -> float:
     """What a domain that follows the noise adds to variances: 1 + 6 (sd(kappa_b) / kappa_b)^2.
 

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import elliprd, elliprf
 
-from estimator.compiled import compiled
+from estimator.compiled import compiled, compiled_part
 from estimator.vectors import Array
 
 WIDEST = 8.0  # of w: curvatures 9e6 to 1; flatter than that is taken as that flat
@@ -129,7 +129,7 @@ def _slopes(k: Array, along: Array, across: Array) -> tuple[Array, Array]:
 TABLE = _table()
 
 
-@compiled
+@compiled_part
 def shape_functions(w: float) -> tuple[float, float, float, float]:
     """ln s, its slope, ln q, its slope at w = atanh(D / m) >= 0."""
     t = w * (STEPS / WIDEST)
@@ -141,7 +141,7 @@ def shape_functions(w: float) -> tuple[float, float, float, float]:
     return s, ds, q, dq
 
 
-@compiled
+@compiled_part
 def _hermite(f0: float, d0: float, f1: float, d1: float, t: float, h: float) -> tuple[float, float]:
     """Cubic through both ends with both slopes, and its own slope, at t in [0, 1]."""
     rise = f1 - f0

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from estimator.compiled import compiled
+from estimator.compiled import compiled, compiled_part
 from estimator.vectors import Array, frozen
 
 POINT_LOAD = 0  # elastic half space: Boussinesq strain, or pressure
@@ -35,7 +35,7 @@ Jet = tuple[float, float, float]  # a value and its derivatives along x and y
 HEADER = 6  # numbers before the samples of a table
 
 
-@compiled
+@compiled_part
 def _point_load(row: Array, dx: float, dy: float) -> Jet:
     """h = A (c - v r^2) / (r^2 + d^2)^(5/2); row A, c, v, d^2."""
     r2 = dx * dx + dy * dy
@@ -46,7 +46,7 @@ def _point_load(row: Array, dx: float, dy: float) -> Jet:
     return weight * numerator, slope * dx, slope * dy
 
 
-@compiled
+@compiled_part
 def _flamant(d2: float, v: float, x: float) -> tuple[float, float]:
     """d^2 (d^2 - v x^2) / (x^2 + d^2)^2 of eq. (82), and its slope."""
     q = 1.0 / (x * x + d2)
@@ -54,7 +54,7 @@ def _flamant(d2: float, v: float, x: float) -> tuple[float, float]:
     return d2 * numerator * q * q, -2.0 * x * d2 * q * q * (v + 2.0 * numerator * q)
 
 
-@compiled
+@compiled_part
 def _separable(row: Array, dx: float, dy: float) -> Jet:
     """h = A h_x(x) (1 + alpha y) h_y(y), x and y turned by eq. (83).
 
@@ -71,7 +71,7 @@ def _separable(row: Array, dx: float, dy: float) -> Jet:
     return h, h_x * row[6] + h_y * row[7], h_y * row[8] - h_x * row[9]
 
 
-@compiled
+@compiled_part
 def _cell(t: float, cells: int) -> tuple[int, float, float]:
     """The cell of a grid that holds t, the fraction of it passed, and 1 (0 beyond the edge)."""
     inside = 1.0 if 0.0 <= t <= cells else 0.0
@@ -80,7 +80,7 @@ def _cell(t: float, cells: int) -> tuple[int, float, float]:
     return i, t - i, inside
 
 
-@compiled
+@compiled_part
 def _nearest(row: Array, dx: float, dy: float) -> Jet:
     nx, ny = int(row[4]), int(row[5])
     i, u, _ = _cell((dx - row[0]) * row[2], nx - 1)
@@ -88,7 +88,7 @@ def _nearest(row: Array, dx: float, dy: float) -> Jet:
     return row[HEADER + (i + int(u + 0.5)) * ny + j + int(v + 0.5)], 0.0, 0.0
 
 
-@compiled
+@compiled_part
 def _linear(row: Array, dx: float, dy: float) -> Jet:
     nx, ny = int(row[4]), int(row[5])
     i, u, in_x = _cell((dx - row[0]) * row[2], nx - 1)
@@ -99,7 +99,7 @@ def _linear(row: Array, dx: float, dy: float) -> Jet:
     return low + (high - low) * u, in_x * (high - low) * row[2], in_y * along_y * row[3]
 
 
-@compiled
+@compiled_part
 def _basis(u: float) -> tuple[tuple[float, float, float, float], tuple[float, float, float, float]]:
     """The four cubic B-splines over one cell, and their slopes."""
     w = 1.0 - u
@@ -108,7 +108,7 @@ def _basis(u: float) -> tuple[tuple[float, float, float, float], tuple[float, fl
     return values, slopes
 
 
-@compiled
+@compiled_part
 def _cubic(row: Array, dx: float, dy: float) -> Jet:
     """B-spline coefficients in the row, one more on every side than there are samples."""
     nx, ny = int(row[4]), int(row[5])

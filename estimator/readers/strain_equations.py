@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from estimator.compiled import compiled
+from estimator.compiled import compiled_part
 from estimator.readers.hertz import ellipse_into
 from estimator.readers.strain_model import ellipse_readings, over_curvature
 from estimator.readers.strain_quadrature import MOST_NODES
@@ -47,7 +47,7 @@ class Room(NamedTuple):
     g: Array
 
 
-@compiled
+@compiled_part
 def solve_into(A: Array, g: Array, n: int, damping: float, L: Array, x: Array) -> bool:
     """x = (A + damping diag A)^-1 g by Cholesky; False if not positive definite."""
     for i in range(n):
@@ -74,7 +74,7 @@ def solve_into(A: Array, g: Array, n: int, damping: float, L: Array, x: Array) -
     return True
 
 
-@compiled
+@compiled_part
 def flat_curvature(state: Array, finger: float, slope: Array) -> float:
     """Smaller curvature of the body (finger removed) and its derivatives over K."""
     p, r = 0.5 * (state[3] - state[4] + finger), state[5]
@@ -83,7 +83,7 @@ def flat_curvature(state: Array, finger: float, slope: Array) -> float:
     return float(0.5 * (state[3] + state[4] - finger) - D)
 
 
-@compiled
+@compiled_part
 def allowed(state: Array, middle: Array, box: Array, least_ratio: float) -> bool:
     """Inside the box of places and forces, and the tensor positive definite."""
     for i in range(3):
@@ -95,7 +95,7 @@ def allowed(state: Array, middle: Array, box: Array, least_ratio: float) -> bool
     return bool(least > least_ratio * m and 0.0 < m < 1e5)
 
 
-@compiled
+@compiled_part
 def evaluate(
     readings: Array, weights: Array, tactels: Index, state: Array, by_ellipse: bool,
     problem: Problem, room: Room,
@@ -138,7 +138,7 @@ def evaluate(
     return chi2, total
 
 
-@compiled
+@compiled_part
 def _add_prior(state: Array, problem: Problem, A: Array, g: Array) -> float:
     """Its residual's square; the lower triangle of A and g grow by it."""
     mean, rate = problem.prior
@@ -153,7 +153,7 @@ def _add_prior(state: Array, problem: Problem, A: Array, g: Array) -> float:
     return r * r
 
 
-@compiled
+@compiled_part
 def new_room(tactels: int) -> Room:
     return Room(
         np.empty(tactels), np.empty((tactels, 6)), np.empty(3), np.empty((3, 4)),

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimator.compiled import compiled
+from estimator.compiled import compiled, compiled_part
 from estimator.readers.hertz import curvature_into, ellipse_into
 from estimator.readers.strain_equations import (
     Problem,
@@ -28,7 +28,7 @@ ROUGH = 1e-2  # of the sum + 100 for the first part: less is not worth a step by
 BY_ELLIPSE, BY_CURVATURE, ON_RIDGE = 0, 1, 2
 
 
-@compiled
+@compiled_part
 def ridge_tangents(w: Array) -> Array:
     """Of the ridge at K = flat I + w w', columns x_0, y_0, ln F, w_x, w_y; (6, 5)."""
     C = np.zeros((6, 5))
@@ -38,7 +38,7 @@ def ridge_tangents(w: Array) -> Array:
     return C
 
 
-@compiled
+@compiled_part
 def ridge_point(state: Array, finger: float, flat: float) -> Array:
     """w of the ridge's point nearest to the state's body curvature."""
     p, r = 0.5 * (state[3] - state[4] + finger), state[5]
@@ -48,14 +48,14 @@ def ridge_point(state: Array, finger: float, flat: float) -> Array:
     return np.array((size * np.cos(angle), size * np.sin(angle)))
 
 
-@compiled
+@compiled_part
 def put_on_ridge(state: Array, w: Array, finger: float, flat: float) -> None:
     state[3] = flat + w[0] * w[0]
     state[4] = flat + w[1] * w[1] + finger
     state[5] = w[0] * w[1]
 
 
-@compiled
+@compiled_part
 def moved_into(
     state: Array, w: Array, step: Array, ridge: bool, problem: Problem, to: Array, w_to: Array
 ) -> None:
@@ -70,7 +70,7 @@ def moved_into(
             to[i] = state[i] + step[i]
 
 
-@compiled
+@compiled_part
 def descend(
     readings: Array, weights: Array, tactels: Index, middle: Array, state: Array, w: Array,
     coordinates: int, problem: Problem, room: Room, information: Array,
@@ -115,7 +115,7 @@ def descend(
     return chi2, MOST_STEPS
 
 
-@compiled
+@compiled_part
 def fit_window(
     readings: Array, weights: Array, tactels: Index, middle: Array, state: Array, ridge: bool,
     problem: Problem, room: Room, information: Array,

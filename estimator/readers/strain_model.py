@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimator.compiled import compiled
+from estimator.compiled import compiled, compiled_part
 from estimator.readers.hertz import ellipse_into
 from estimator.readers.response import POINT_LOAD, ResponseModel
 from estimator.readers.strain_array import StrainArray
@@ -26,7 +26,7 @@ DIGITS = 5.5  # of the quadrature; a strain finger rounds to two of its peak's
 STATE = 6  # x_0, y_0 [m], ln F, K_xx, K_yy, K_xy of the relative curvature [1/m]
 
 
-@compiled
+@compiled_part
 def ellipse_readings(
     state: Array, M: Array, quadrature: tuple[float, float], compliance: float, kind: int,
     rows: Array, positions: Array, tactels: Index, readings: Array, J: Array, u: Array, p: Array,
@@ -57,7 +57,7 @@ def ellipse_readings(
         J[i, 3], J[i, 4], J[i, 5] = scale * s[3], scale * s[4], scale * s[5]
 
 
-@compiled
+@compiled_part
 def over_curvature(J: Array, M_J: Array) -> None:
     """Turn derivatives over the ellipse into those over the relative curvature, in place."""
     for i in range(len(J)):

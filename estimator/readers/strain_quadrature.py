@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import roots_jacobi
 
-from estimator.compiled import compiled
+from estimator.compiled import compiled_part
 from estimator.readers.response import response_at
 from estimator.vectors import Array
 
@@ -33,7 +33,7 @@ def _gauss_rules() -> Array:
 GAUSS = _gauss_rules()
 
 
-@compiled
+@compiled_part
 def nodes_needed(half_axis: float, depth: float, digits: float) -> int:
     """Of a Gauss rule over this half axis, for a response this deep."""
     q = depth / half_axis
@@ -41,7 +41,7 @@ def nodes_needed(half_axis: float, depth: float, digits: float) -> int:
     return min(max(n, 2), MOST_NODES)
 
 
-@compiled
+@compiled_part
 def disk_nodes(M: Array, depth: float, digits: float, u: Array, p: Array) -> int:
     """Write nodes u_x, u_y, weight and their places M u on the skin; how many.
 
@@ -68,7 +68,7 @@ def disk_nodes(M: Array, depth: float, digits: float, u: Array, p: Array) -> int
     return k
 
 
-@compiled
+@compiled_part
 def point_load_sums(rows: Array, t: int, x: float, y: float, p: Array, u: Array, n: int) -> Sums:
     """Weighted sums of h, h_x, h_y, h_x u_x, h_y u_y, h_x u_y + h_y u_x for a half space.
 
@@ -94,7 +94,7 @@ def point_load_sums(rows: Array, t: int, x: float, y: float, p: Array, u: Array,
     return A * s0, B * s1, B * s2, B * s3, B * s4, B * s5
 
 
-@compiled
+@compiled_part
 def response_sums(kind: int, row: Array, x: float, y: float, p: Array, u: Array, n: int) -> Sums:
     """The same of any response."""
     s0, s1, s2, s3, s4, s5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from estimator.compiled import compiled
+from estimator.compiled import compiled_part
 from estimator.vectors import Array, Index
 from hand_models.chains import Chains
 from planner.kinematics.meridian import Meridian, distance_and_slopes
@@ -64,7 +64,7 @@ class Demands(NamedTuple):
     most_turn: float
 
 
-@compiled
+@compiled_part
 def write_rows(
     chains: Chains, demands: Demands, q: Array, R: Array, p: Array, middle: Array,
     rows: Array, residual: Array,
@@ -89,7 +89,7 @@ def write_rows(
     return used, off
 
 
-@compiled
+@compiled_part
 def _pad_rows(
     chains: Chains, demands: Demands, knot: int, j: int, joints_R: Array, joints_p: Array,
     R: Array, p: Array, middle: Array, rows: Array, residual: Array, first: int, nq: int,
@@ -131,7 +131,7 @@ def _pad_rows(
     return sqrt(square), angle
 
 
-@compiled
+@compiled_part
 def _base_rows(arm: Array, rows: Array, first: int, nq: int, scale: float) -> None:
     """How a point moves with the base's position and its turn about the contacts' middle."""
     for a in range(3):
@@ -141,7 +141,7 @@ def _base_rows(arm: Array, rows: Array, first: int, nq: int, scale: float) -> No
     rows[first + 2, nq + 3], rows[first + 2, nq + 4] = arm[1] * scale, -arm[0] * scale
 
 
-@compiled
+@compiled_part
 def _sphere_rows(
     chains: Chains, demands: Demands, knot: int, joints_R: Array, joints_p: Array,
     R: Array, p: Array, middle: Array, rows: Array, residual: Array, first: int, nq: int,
@@ -177,7 +177,7 @@ def _sphere_rows(
     return count, deepest
 
 
-@compiled
+@compiled_part
 def _push_row(
     chains: Chains, demands: Demands, knot: int, k: int, joints_R: Array, joints_p: Array,
     R: Array, p: Array, middle: Array, at: Array, push: Array, row: Array, nq: int,
@@ -208,7 +208,7 @@ def _push_row(
         j = chains.parents[j]
 
 
-@compiled
+@compiled_part
 def _in_world(
     demands: Demands, k: int, joints_R: Array, joints_p: Array, R: Array, p: Array, out: Array
 ) -> None:
@@ -220,7 +220,7 @@ def _in_world(
         out[a] = p[a] + R[a, 0] * x + R[a, 1] * y + R[a, 2] * z
 
 
-@compiled
+@compiled_part
 def _distance(demands: Demands, at: Array, push: Array) -> float:
     """From the nearer of object and table, and the way out."""
     R, o = demands.R_WO, demands.p_WO

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from math import atan2, cos, hypot, sin, sqrt
 
-from estimator.compiled import V3, compiled
+from estimator.compiled import V3, compiled, compiled_part
 from estimator.vectors import Array
 
 STEEPEST = -0.2  # slope that a step reckons with at least: on a wall that leans away it stays short
@@ -68,14 +68,14 @@ def fill_met(
             met[b, i, 2], met[b, i, 3] = hypot(hypot(px, py) - R_h, pz - Z_h), h
 
 
-@compiled
+@compiled_part
 def _offset(r: float, dr: float, ddr: float, h: float, pad: float) -> V3:
     """R, Z and dZ/dh = 1 - rho r'' / w^3; dR/dh is r' times that."""
     w = sqrt(1.0 + dr * dr)
     return (r + pad / w, h - pad * dr / w, 1.0 - pad * ddr / (w * w * w))
 
 
-@compiled
+@compiled_part
 def _wall(heights: Array, pieces: Array, z: float) -> V3:
     """Radius and its derivatives; beyond the ends straight on."""
     last = len(heights) - 1

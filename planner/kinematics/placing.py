@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import cos, sin
 
-from estimator.compiled import compiled
+from estimator.compiled import compiled, compiled_part
 from estimator.vectors import Array
 from hand_models.chains import Chains
 from planner.kinematics.small import clear
@@ -23,7 +23,7 @@ def place_joints(chains: Chains, q: Array, R: Array, p: Array) -> None:
         _place(chains, q, j, R, p)
 
 
-@compiled
+@compiled_part
 def _place(chains: Chains, q: Array, j: int, R: Array, p: Array) -> None:
     """One joint whose parent is in place: fixed pose, then Rodrigues' formula and the slide."""
     parent, w = chains.parents[j], chains.angular[j]
@@ -46,7 +46,7 @@ def _place(chains: Chains, q: Array, j: int, R: Array, p: Array) -> None:
         R[j, i, 2] = keep * f2 + (1.0 - c) * along * w[2] + s * (f0 * w[1] - f1 * w[0])
 
 
-@compiled
+@compiled_part
 def _times(row: Array, matrix: Array, column: int) -> float:
     total = 0.0
     for k in range(3):

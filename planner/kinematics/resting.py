@@ -15,7 +15,7 @@ from math import acos, atan2, hypot, sqrt
 
 import numpy as np
 
-from estimator.compiled import compiled
+from estimator.compiled import compiled, compiled_part
 from estimator.linear import factor, solve_factored
 from estimator.vectors import Array, Index
 from hand_models.chains import Chains
@@ -65,7 +65,7 @@ def rest(
                 _take(chains, step, pads, q[i], R[i], p[i])
 
 
-@compiled
+@compiled_part
 def _pads(
     chains: Chains, fingers: Index, R: Array, p: Array, joints_R: Array, joints_p: Array,
     pads: Array, jacobians: Array,
@@ -91,7 +91,7 @@ def _pads(
                 )
 
 
-@compiled
+@compiled_part
 def _residuals(
     chains: Chains, meridian: Meridian, inset: Array, cone: float, fingers: Index, pads: Array,
     jacobians: Array, rows: Array, residual: Array, places: Array,
@@ -128,7 +128,7 @@ def _residuals(
         _turned_away(n, pad, max(angle - cone, 0.0), angle, rho, move, spin, first, rows, residual)
 
 
-@compiled
+@compiled_part
 def _motions(arm: Array, jacobians: Array, move: Array, spin: Array) -> None:
     """How a pad's centre moves and turns with joints, base position and turn, (3, nq + 6)."""
     nq = jacobians.shape[2]
@@ -143,7 +143,7 @@ def _motions(arm: Array, jacobians: Array, move: Array, spin: Array) -> None:
     move[2, nq + 3], move[2, nq + 4] = arm[1], -arm[0]
 
 
-@compiled
+@compiled_part
 def _turned_away(
     n: Array, pad: Array, excess: float, angle: float, rho: float, move: Array, spin: Array,
     first: int, rows: Array, residual: Array,
@@ -169,7 +169,7 @@ def _turned_away(
         rows[first + 3, c] = (n[0] * v1 - n[1] * v0 + d0 * pad[1] - d1 * pad[0]) / ANGLE_UNIT
 
 
-@compiled
+@compiled_part
 def _least_step(
     rows: Array, residual: Array, system: Array, lower: Array, step: Array, nq: int
 ) -> None:
@@ -199,7 +199,7 @@ def _least_step(
         step[c] /= longest
 
 
-@compiled
+@compiled_part
 def _take(chains: Chains, step: Array, pads: Array, q: Array, R: Array, p: Array) -> None:
     """Joints within their limits, the base turned about the pads' middle and shifted."""
     nq, m = len(q), len(pads)

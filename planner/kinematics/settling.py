@@ -17,7 +17,7 @@ from math import acos, sin
 
 import numpy as np
 
-from estimator.compiled import compiled
+from estimator.compiled import compiled, compiled_part
 from estimator.linear import factor, solve_factored
 from estimator.vectors import Array
 from hand_models.chains import Chains
@@ -59,7 +59,7 @@ def settle(
     return off
 
 
-@compiled
+@compiled_part
 def _step(
     chains: Chains, demands: Demands, q: Array, p: Array, rows: Array, residual: Array,
     used: int, system: Array, lower: Array, dual: Array, free: Array, step: Array,
@@ -93,7 +93,7 @@ def _step(
         step[c] /= longest
 
 
-@compiled
+@compiled_part
 def _freeze(chains: Chains, demands: Demands, q: Array, p: Array, step: Array, free: Array) -> bool:
     """Whether the step leads out of limits where it already is at them; frees those no more."""
     nq, found = q.shape[1], False
@@ -114,7 +114,7 @@ def _freeze(chains: Chains, demands: Demands, q: Array, p: Array, step: Array, f
     return found
 
 
-@compiled
+@compiled_part
 def _take(
     chains: Chains, demands: Demands, step: Array, middle: Array, q: Array, R: Array, p: Array
 ) -> None:
@@ -133,7 +133,7 @@ def _take(
         p[a] = min(max(moved, demands.box[0, a]), demands.box[1, a])
 
 
-@compiled
+@compiled_part
 def _turn_back(demands: Demands, R: Array) -> None:
     """Onto the largest turn from nominal, where it is beyond."""
     nominal, trace = demands.R_nominal, 0.0

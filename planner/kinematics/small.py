@@ -7,20 +7,20 @@ from __future__ import annotations
 
 from math import cos, sin, sqrt
 
-from estimator.compiled import V3, compiled
+from estimator.compiled import V3, compiled_part
 from estimator.vectors import Array
 
 LEAST_ANGLE = 1e-12  # below which a rotation is the identity [rad]
 
 
-@compiled
+@compiled_part
 def clear(matrix: Array) -> None:
     for i in range(matrix.shape[0]):
         for j in range(matrix.shape[1]):
             matrix[i, j] = 0.0
 
 
-@compiled
+@compiled_part
 def times(R: Array, x: float, y: float, z: float) -> V3:
     """R v."""
     return (
@@ -30,7 +30,7 @@ def times(R: Array, x: float, y: float, z: float) -> V3:
     )
 
 
-@compiled
+@compiled_part
 def transposed_times(R: Array, x: float, y: float, z: float) -> V3:
     """R^T v."""
     return (
@@ -40,7 +40,7 @@ def transposed_times(R: Array, x: float, y: float, z: float) -> V3:
     )
 
 
-@compiled
+@compiled_part
 def turned(w0: float, w1: float, w2: float, x: float, y: float, z: float) -> V3:
     """exp(w) v, by Rodrigues' formula."""
     square = w0 * w0 + w1 * w1 + w2 * w2
@@ -56,7 +56,7 @@ def turned(w0: float, w1: float, w2: float, x: float, y: float, z: float) -> V3:
     )
 
 
-@compiled
+@compiled_part
 def turn_by(w0: float, w1: float, w2: float, R: Array) -> None:
     """R becomes exp(w) R."""
     for k in range(3):

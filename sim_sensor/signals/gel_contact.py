@@ -18,7 +18,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import elliprd, elliprf
 
-from estimator.compiled import compiled
+from estimator.compiled import compiled, compiled_part
 from estimator.readers.depth_fit import dome
 from estimator.vectors import Array
 
@@ -59,7 +59,7 @@ def outside(x: float, y: float, a: float, b: float, root_ab: float, table: Array
     return float(whole - x2 * along - y2 * across)
 
 
-@compiled
+@compiled_part
 def height(x: float, y: float, c: Array) -> float:
     """Polynomial of `gel_shape.POWERS`."""
     second = c[0] * x * x + c[1] * x * y + c[2] * y * y

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimator.compiled import compiled
+from estimator.compiled import compiled, compiled_part
 from estimator.readers.disk_rule import disk_rule
 from estimator.readers.response import POINT_LOAD, ResponseModel, response_at
 from estimator.vectors import Array, Index
@@ -27,7 +27,7 @@ def _stacked() -> tuple[Array, Index]:
 NODES, COUNTS = _stacked()
 
 
-@compiled
+@compiled_part
 def _dragged_sum(
     row: Array, x: float, y: float, u: float, v: float, p: Array, weights: Array, n: int
 ) -> float:
@@ -43,7 +43,7 @@ def _dragged_sum(
     return float(row[0] * total)
 
 
-@compiled
+@compiled_part
 def _sum(kind: int, row: Array, x: float, y: float, p: Array, weights: Array, n: int) -> float:
     """Any response under the normal pressure alone."""
     total = 0.0
@@ -52,7 +52,7 @@ def _sum(kind: int, row: Array, x: float, y: float, p: Array, weights: Array, n:
     return total
 
 
-@compiled
+@compiled_part
 def _places_into(M: Array, rule: int, p: Array) -> None:
     """Write M u for the nodes u of the rule."""
     nodes = NODES[rule]
