@@ -62,21 +62,14 @@ class SurfaceOfRevolution:
             theta, z: Of equal (broadcastable) shapes [rad], [m].
         """
         theta, z = np.broadcast_arrays(np.asarray(theta, float), np.asarray(z, float))
-        r, dr, ddr = self.profile.derivatives(z)
-        c, s, zero, one = np.cos(theta), np.sin(theta), np.zeros_like(z), np.ones_like(z)
-        w = np.sqrt(dr**2 + 1.0)
-        x = np.stack([r * c, r * s, z], axis=-1)  # (1)
-        n = np.stack([c, s, -dr], axis=-1) / w[..., None]  # (2)
-        k_z = np.stack([dr * c, dr * s, one], axis=-1) / w[..., None]  # (16)
-        k_theta = np.stack([-s, c, zero], axis=-1)  # (17)
-        R = self.frame
+        local, R = geometry_at(theta, z, *self.profile.derivatives(z)), self.frame
         return Geometry(
-            p=self.axis.point + x @ R,
-            n=n @ R,
-            k_theta=k_theta @ R,
-            k_z=k_z @ R,
-            kappa_theta=1.0 / (r * w),  # (20)
-            kappa_z=-ddr / w**3,  # (19)
+            p=self.axis.point + local.p @ R,
+            n=local.n @ R,
+            k_theta=local.k_theta @ R,
+            k_z=local.k_z @ R,
+            kappa_theta=local.kappa_theta,
+            kappa_z=local.kappa_z,
         )
 
     def contact(self, place: Place, noise: SensorNoise) -> Contact:
@@ -117,6 +110,20 @@ class SurfaceOfRevolution:
         cap = np.maximum(low - z, z - high)
         corner = np.hypot(np.maximum(rho - r, 0.0), np.maximum(cap, 0.0))
         return np.where(cap > 0, corner, np.maximum(wall, cap))
+
+
+def geometry_at(theta: Array, z: Array, r: Array, dr: Array, ddr: Array) -> Geometry:
+    """Geometry about the z axis, from meridian angles, heights and r, r', r'' there."""
+    c, s, zero, one = np.cos(theta), np.sin(theta), np.zeros_like(z), np.ones_like(z)
+    w = np.sqrt(dr**2 + 1.0)
+    return Geometry(
+        p=np.stack([r * c, r * s, z], axis=-1),  # (1)
+        n=np.stack([c, s, -dr], axis=-1) / w[..., None],  # (2)
+        k_theta=np.stack([-s, c, zero], axis=-1),  # (17)
+        k_z=np.stack([dr * c, dr * s, one], axis=-1) / w[..., None],  # (16)
+        kappa_theta=1.0 / (r * w),  # (20)
+        kappa_z=-ddr / w**3,  # (19)
+    )
 
 
 def axis_point_height(r: Array, dr: Array, z: Array) -> Array:

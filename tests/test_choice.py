@@ -78,7 +78,7 @@ def test_margins_hold_over_the_belief_not_at_its_mean_only():
 def test_a_finger_that_may_miss_is_worth_less():
     """Places near the rim and below it, equal in every other respect."""
     rim, inner = placements((0, 100, 230), (25, 0, 58)), placements((0, 100, 230), (25, 0, 30))
-    held = belief(angle=10.0, offset=5e-3)
+    held = belief(angle=20.0, offset=5e-3)
     costs = [ranked(which, held, margin=0.0) for which in (rim, inner)]
     missed = [1.0 - one.hit[0] for one in costs]
     assert missed[0] > missed[1] + 0.1

@@ -12,15 +12,14 @@ import numpy as np
 
 from estimator.belief import SampledObjects
 from estimator.singular import PlacedTriples
-from estimator.surface import Geometry
+from estimator.surface import Geometry, geometry_at
 from estimator.vectors import Array, Mask
 from planner.choosing.sampled_surfaces import SampledSurfaces
-from planner.kinematics.meeting import fill_met
+from planner.kinematics.meeting import MET, fill_met
 
 BEFORE, BEHIND = 0.030, 0.025  # how far an approach goes, about the expected contact [m]
 STEPS = 6
-MET = 5e-4  # gap that counts as none [m]
-RIM = 0.02  # of the height at each end where a touch does not count as one of the wall
+EDGE = 1e-3  # radius that the rims of objects are taken to have [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,8 +28,9 @@ class Prospects:
 
     Args:
         geometry: Exact surface geometry where each approach meets the object, (B, N * m).
-        theta, z, r, dr, ddr: Places and profiles there.
-        hit: Whether the approach meets the wall within its stroke.
+        theta, z, r, dr, ddr: Places and profiles there; on a rim, slopes between the wall's and
+            the flat end's, by which its parallel tells as much as any other.
+        hit: Whether the approach meets wall or rim within its stroke.
     """
 
     geometry: Geometry
@@ -57,32 +57,28 @@ def prospects(samples: SampledObjects, p_W: Array, n_W: Array, *, pad: float) ->
     """
     B, (N, m) = len(samples.points), p_W.shape[:2]
     surfaces = SampledSurfaces(samples)
-    s, theta, off_wall, z = _met(surfaces, p_W.reshape(-1, 3), n_W.reshape(-1, 3), pad)
+    met = _met(surfaces, p_W.reshape(-1, 3), n_W.reshape(-1, 3), pad)
+    s, theta, gap, height, dr, ddr = np.moveaxis(met, -1, 0)
     low, high = surfaces.profiles.z_range
-    inset = RIM * (high - low)
-    inside = np.clip(z, low, high)
-    hit = (off_wall < MET) & (s > -BEFORE) & (s < BEHIND)
-    hit &= (z > low + inset) & (z < high - inset)
-    places = (theta, inside, *surfaces.profiles.derivatives(inside))
-    theta, inside, r, dr, ddr = (x.reshape(B, N, m) for x in places)
+    hit = (gap < MET) & (s > -BEFORE) & (s < BEHIND) & (height >= low) & (height <= high)
+    z = np.clip(height, low, high)
+    places = (theta, z, surfaces.profiles.derivatives(z)[0], dr, ddr)
+    geometry = surfaces.placed(geometry_at(*places))
+    theta, z, r, dr, ddr = (x.reshape(B, N, m) for x in places)
     return Prospects(
-        surfaces.at(*places[:2]), theta, inside, r, dr, ddr, hit.reshape(B, N, m),
-        samples.points, samples.directions,
-    )  # fmt: skip
+        geometry, theta, z, r, dr, ddr, hit.reshape(B, N, m), samples.points, samples.directions
+    )
 
 
-def _met(
-    surfaces: SampledSurfaces, p: Array, n: Array, pad: float
-) -> tuple[Array, Array, Array, Array]:
-    """Where pads on lines p - s n (M, 3) meet walls: s, meridian angle, gap, height, (B, M)."""
-    objects, met = surfaces.objects, np.zeros((len(surfaces.objects.points), len(p), 4))
+def _met(surfaces: SampledSurfaces, p: Array, n: Array, pad: float) -> Array:
+    """What pads on lines p - s n (M, 3) meet, (B, M, 6) as `fill_met` has it."""
+    objects, met = surfaces.objects, np.zeros((len(surfaces.objects.points), len(p), 6))
     fill_met(
         np.asarray(objects.z), surfaces.profiles.coefficients, np.asarray(objects.points),
         surfaces.frames, np.ascontiguousarray(p), np.ascontiguousarray(n),
-        np.full(len(p), pad), np.array([-1.5 * BEFORE, 1.5 * BEHIND]), STEPS, met,
+        np.full(len(p), pad), np.array([-1.5 * BEFORE, 1.5 * BEHIND]), STEPS, EDGE, met,
     )  # fmt: skip
-    s, theta, off_wall, z = np.moveaxis(met, -1, 0)
-    return s, theta, off_wall, z
+    return met
 
 
 def with_earlier(landed: Prospects, samples: SampledObjects, p_W: Array) -> PlacedTriples | None:

@@ -8,12 +8,9 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from estimator.axis import Axis
 from estimator.belief import SampledObjects
-from estimator.surface import Geometry, SurfaceOfRevolution
+from estimator.surface import Geometry, geometry_at
 from estimator.vectors import Array, basis_across
-
-_UPRIGHT = Axis(np.zeros(3), np.array([0.0, 0.0, 1.0]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +68,11 @@ class SampledSurfaces:
 
     def at(self, theta: Array, z: Array) -> Geometry:
         """Exact geometry at places (B, N), in the world."""
-        upright = SurfaceOfRevolution(_UPRIGHT, self.profiles)
-        local, R = upright.at(theta, z), upright.frame.T @ self.frames
+        return self.placed(geometry_at(theta, z, *self.profiles.derivatives(z)))
+
+    def placed(self, local: Geometry) -> Geometry:
+        """Geometry (B, N) about each object's own axis, in the world."""
+        R = self.frames
         return Geometry(
             p=self.objects.points[:, None] + local.p @ R,
             n=local.n @ R,
