@@ -7,8 +7,8 @@ import logging
 import numpy as np
 import pinocchio as pin
 import pytest
-from benchmark_reach import LEAST_GAP, SPREAD, targets
 from reach_peers import MinkPeer, PinkPeer, ScipyPeer, floating_mjcf, moved
+from reach_triples import LEAST_GAP, SPREAD, targets
 
 from hand_models import load_hand
 from planner.reaching.starts import Start
