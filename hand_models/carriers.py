@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hand_models.fields import (
-    HandError,
     Vector,
     number_within,
     numbers,
     optional_text,
-    refuse_unknown_keys,
+    own_table,
     text,
     vector,
 )
@@ -65,15 +64,13 @@ class WristDescription:
     turn_deg: float
 
 
-def read_arm(table: object, folder: Path, where: str) -> ArmDescription:
+def read_arm(value: object, folder: Path, where: str) -> ArmDescription:
     """The `[arm]` table.
 
     Raises:
         HandError: What is missing, unknown or wrong in it.
     """
-    if not isinstance(table, dict):
-        raise HandError(f"{where} must be a table, [arm], got {table!r}")
-    refuse_unknown_keys(table, _ARM_KEYS, where)
+    table = own_table(value, "arm", _ARM_KEYS, where)
     return ArmDescription(
         source=read_source(table, folder, where),
         prefix=optional_text(table, "prefix", where) or "",
@@ -86,15 +83,13 @@ def read_arm(table: object, folder: Path, where: str) -> ArmDescription:
     )
 
 
-def read_wrist(table: object, where: str) -> WristDescription:
+def read_wrist(value: object, where: str) -> WristDescription:
     """The `[wrist]` table.
 
     Raises:
         HandError: What is missing, unknown or wrong in it.
     """
-    if not isinstance(table, dict):
-        raise HandError(f"{where} must be a table, [wrist], got {table!r}")
-    refuse_unknown_keys(table, _WRIST_KEYS, where)
+    table = own_table(value, "wrist", _WRIST_KEYS, where)
     return WristDescription(
         at=vector(table, "at", where),
         at_rotation_deg=vector(table, "at_rotation_deg", where, NOWHERE),

@@ -21,6 +21,14 @@ def refuse_unknown_keys(table: Mapping[str, Any], allowed: Iterable[str], where:
         raise HandError(f"{where}: unknown key '{key}'; allowed are {', '.join(sorted(allowed))}")
 
 
+def own_table(value: object, name: str, allowed: Iterable[str], where: str) -> dict[str, Any]:
+    """A table of the description, [name] in TOML, with known keys only."""
+    if not isinstance(value, dict):
+        raise HandError(f"{where} must be a table, [{name}], got {value!r}")
+    refuse_unknown_keys(value, allowed, where)
+    return value
+
+
 def text(table: Mapping[str, Any], key: str, where: str) -> str:
     value = _required(table, key, where)
     if not isinstance(value, str) or not value:

@@ -49,6 +49,13 @@ def link_points(hand: Hand, index: int) -> Array:
     return np.asarray(vertices(shape.geometry) @ X.rotation.T + X.translation)
 
 
+def points_moved_by(hand: Hand, joint: int) -> Array:
+    """(N, 3) points of all visual shapes that a joint moves, in its frame [m]; none, (0, 3)."""
+    shapes = hand.visual_model.geometryObjects
+    own = [link_points(hand, i) for i, s in enumerate(shapes) if int(s.parentJoint) == joint]
+    return np.vstack([np.zeros((0, 3)), *own])
+
+
 def pad_in_joint(hand: Hand, finger: Finger) -> tuple[int, Array, Array]:
     """The joint that moves a pad, and the pad's centre and normal in that joint's frame."""
     frame = hand.model.frames[finger.tip_frame_id]

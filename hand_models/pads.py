@@ -17,7 +17,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from hand_models.fields import HandError
-from hand_models.geometry import link_points, pad_in_joint, vertices
+from hand_models.geometry import pad_in_joint, points_moved_by, vertices
 from hand_models.joints import joint_motion
 from hand_models.part import Part
 
@@ -83,10 +83,8 @@ def pad_bulges(hand: Hand, cone: float) -> Array:
     out = np.zeros(len(hand.fingers))
     for i, finger in enumerate(hand.fingers):
         joint, centre, normal = pad_in_joint(hand, finger)
-        shapes = hand.visual_model.geometryObjects
-        own = [k for k, shape in enumerate(shapes) if int(shape.parentJoint) == joint]
-        if own:
-            points, u = np.vstack([link_points(hand, k) for k in own]), _cap(normal, cone)
+        points, u = points_moved_by(hand, joint), _cap(normal, cone)
+        if len(points):
             out[i] = max(np.max((points @ u.T).max(axis=0) - u @ centre) - finger.pad_radius, 0.0)
     out.setflags(write=False)
     return out

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hand_models.fields import HandError
-from hand_models.geometry import link_points, pad_in_joint
+from hand_models.geometry import link_points, pad_in_joint, points_moved_by
 
 if TYPE_CHECKING:
     from hand_models.hand import Finger, Hand
@@ -85,11 +85,9 @@ def _check_motion(hand: Hand, finger: Finger) -> None:
 
 def _check_place(hand: Hand, finger: Finger) -> None:
     joint, centre, _ = pad_in_joint(hand, finger)
-    shapes = hand.visual_model.geometryObjects
-    own = [i for i, shape in enumerate(shapes) if int(shape.parentJoint) == joint]
-    if not own:
+    points = points_moved_by(hand, joint)
+    if not len(points):
         return  # the pad stands for itself
-    points = np.vstack([link_points(hand, i) for i in own])
     off = float(np.linalg.norm(points - centre, axis=1).min()) - finger.pad_radius
     if off > _OFF_LINK:
         raise HandError(

@@ -139,20 +139,16 @@ def test_without_a_place_to_start_from_no_motion_is_planned():
     assert made(None).motion is None
 
 
-def farthest_open(X_WB, solid):
-    """Of some open hands the one that has most room beside the object."""
-    return max(
-        (np.clip(HAND.middle - by, HAND.lower, HAND.upper) for by in np.linspace(0.0, 0.4, 5)),
-        key=lambda q: COLLISION.object_clearance(q, X_WB, solid.slices, solid.X_WO).nearest()[1],
-    )
-
-
 def test_a_base_that_is_fixed_stays_and_the_joints_lead_to_the_object(plan):
     X_WB = plan.reach.X_WB
     fixed = ReachOptions(workspace=Workspace(X_WB))
-    movable = movable_among(HAND, COLLISION, believed_solid(BELIEF.surface), fixed, LIMITS)
+    solid = believed_solid(BELIEF.surface)
+    movable = movable_among(HAND, COLLISION, solid, fixed, LIMITS)
     approaches = [probe.approach for probe in plan.probes]
-    opened = farthest_open(X_WB, believed_solid(BELIEF.surface))
+    opened = max(  # of some open hands the one with most room beside the object
+        (np.clip(HAND.middle - by, HAND.lower, HAND.upper) for by in np.linspace(0.0, 0.4, 5)),
+        key=lambda q: COLLISION.object_clearance(q, X_WB, solid.slices, solid.X_WO).nearest()[1],
+    )
     found = plan_round(movable, approaches, [plan.retreat], Configuration(opened, X_WB))
     assert found.enter is None
     assert found.leave is None
