@@ -130,10 +130,8 @@ def _best_placement(
         untold=options.offset_guard, pad=tools.pad,
     )  # fmt: skip
     rank_all = partial(
-        rank, belief=belief, samples=samples, noise=sensor, goal=goal,
-        margin=options.margin, offset_guard=options.offset_guard, height=options.grasp_height,
-        pad=tools.pad, criterion=options.criterion, rng=rng,
-    )  # fmt: skip
+        rank, worth=worth, margin=options.margin, criterion=options.criterion, rng=rng
+    )
     ranking, scored = rank_all(candidates), 0
     if options.sweep and tools.arm is None and count == 3 and options.criterion == "information":
         more, scored = swept(

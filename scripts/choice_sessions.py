@@ -26,6 +26,7 @@ from planner.candidates import END_MARGIN, Candidates
 from planner.choosing.choice import MARGIN, rank
 from planner.choosing.criteria import Criterion
 from planner.choosing.prospects import BEFORE, BEHIND
+from planner.choosing.worth import Worth
 from planner.explore import explore
 from planner.goal import Goal
 from planner.options import OFFSET_GUARD, PlannerOptions
@@ -109,11 +110,9 @@ def _anywhere(
         candidates = _places(belief.surface, rng)
         samples = sample_objects(belief, OBJECTS, rng=rng)
         fresh = belief.estimate is None or belief.estimate.verdict != "determined"
-        ranking = rank(
-            candidates, belief, samples, told, GOAL,
-            margin=MARGIN if fresh else 0.0, offset_guard=OFFSET_GUARD, criterion=criterion,
-            pad=PAD, rng=rng,
-        )  # fmt: skip
+        worth = Worth(belief, samples, told, GOAL, untold=OFFSET_GUARD, pad=PAD)
+        margin = MARGIN if fresh else 0.0
+        ranking = rank(candidates, worth, margin=margin, criterion=criterion, rng=rng)
         best = int(ranking.order[0])
         place = belief.surface.at(candidates.theta[best], candidates.z[best])
         felt = [_felt(world, p, n, told) for p, n in zip(place.p, place.n, strict=True)]

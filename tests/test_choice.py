@@ -15,6 +15,7 @@ from estimator.surface import Place, SurfaceOfRevolution
 from planner.candidates import Candidates
 from planner.choosing.choice import rank
 from planner.choosing.prospects import BEFORE, BEHIND, prospects
+from planner.choosing.worth import Worth
 from planner.goal import Goal
 
 AXIS = Axis(np.array([0.5, 0.1, 0.2]), np.array([0.1, -0.2, 0.9]))
@@ -49,7 +50,7 @@ def placements(theta_deg, z_mm):
 def ranked(candidates, held=None, margin=0.08, seed=0, noise=NOISE):
     held = held or belief()
     samples = sample_objects(held, 16, rng=np.random.default_rng(seed))
-    return rank(candidates, held, samples, noise, GOAL, margin=margin)
+    return rank(candidates, Worth(held, samples, noise, GOAL), margin=margin)
 
 
 @pytest.mark.parametrize(

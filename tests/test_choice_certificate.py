@@ -90,11 +90,7 @@ def test_no_random_touches_fall_below_the_floor(seed):
 @pytest.mark.parametrize("seed", range(3))
 def test_a_certificate_orders_floor_optimum_and_chosen(seed):
     held = worth(30 + seed)
-    sensor = SENSORS["gel"]
-    ranking = rank(
-        random_candidates(seed), held.belief, held.samples, sensor, GOAL,
-        margin=MARGIN, offset_guard=GUARD,
-    )  # fmt: skip
+    ranking = rank(random_candidates(seed), held, margin=MARGIN)
     found = certificate(held, ranking, int(ranking.order[0]), margin=MARGIN)
     assert found.floor <= found.optimum
     assert found.floor <= found.reachable <= found.chosen

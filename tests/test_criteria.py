@@ -12,6 +12,7 @@ from estimator.surface import Place, SurfaceOfRevolution
 from planner.candidates import Candidates
 from planner.choosing.choice import rank
 from planner.choosing.criteria import REFUSING
+from planner.choosing.worth import Worth
 from planner.goal import Goal
 
 AXIS = Axis(np.array([0.5, 0.1, 0.2]), np.array([0.1, -0.2, 0.9]))
@@ -41,7 +42,8 @@ def ranked(candidates, criterion, held=None, margin=0.08, seed=0, goal=GOAL):
     held = held or belief()
     rng = np.random.default_rng(seed)
     samples = sample_objects(held, 16, rng=rng)
-    return rank(candidates, held, samples, NOISE, goal, margin=margin, criterion=criterion, rng=rng)
+    worth = Worth(held, samples, NOISE, goal)
+    return rank(candidates, worth, margin=margin, criterion=criterion, rng=rng)
 
 
 def random_placements(count=60, seed=1):
@@ -137,4 +139,4 @@ def test_random_without_an_rng_says_so():
     held = belief()
     samples = sample_objects(held, 4, rng=np.random.default_rng(0))
     with pytest.raises(ValueError, match="an rng is needed"):
-        rank(random_placements(4), held, samples, NOISE, GOAL, criterion="random")
+        rank(random_placements(4), Worth(held, samples, NOISE, GOAL), criterion="random")

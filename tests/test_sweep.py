@@ -34,7 +34,7 @@ def scene():
     laid = placement_candidates(
         hand_tools(hand, ReachOptions(cone=CONE)).reach_map, belief.surface, count=300, rng=rng
     )
-    ranking = rank(laid, belief, worth.samples, worth.noise, GOAL)
+    ranking = rank(laid, worth)
     more, scored = swept(
         hand, posture_library(hand), link_spheres(hand), laid, ranking.order[:FROM], worth,
         cone=CONE, is_self_free=HandCollision(hand).is_self_free, rng=rng,
@@ -72,6 +72,6 @@ def test_tens_of_thousands_are_scored_and_few_come_out(scene):
 def test_the_best_swept_triple_is_worth_more_than_the_best_laid(scene):
     """On the objects that both are scored by."""
     _, worth, laid, ranking, more, _ = scene
-    both = rank(joined([laid, more]), worth.belief, worth.samples, worth.noise, GOAL)
+    both = rank(joined([laid, more]), worth)
     best = both.value[len(laid) :][both.margin[len(laid) :] >= 0.08].min()
     assert best < ranking.value[ranking.order].min()

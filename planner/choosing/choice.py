@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.belief import Belief, SampledObjects
+from estimator.belief import Belief
 from estimator.bounds import AxisBound, SensorErrors, bound_from_directions
 from estimator.contact import SensorNoise
 from estimator.information import (
@@ -32,7 +32,6 @@ from planner.candidates import Candidates
 from planner.choosing.criteria import REFUSING, Criterion, Merits, costs
 from planner.choosing.prospects import Prospects
 from planner.choosing.worth import Worth
-from planner.goal import Goal
 
 MARGIN = 0.08  # from every singularity, in three of four sampled objects
 MISLABEL_COST = 4.0  # a wrong labelling is this much worse, as a logarithm of error
@@ -79,31 +78,22 @@ class Ranking:
 
 def rank(
     candidates: Candidates,
-    belief: Belief,
-    samples: SampledObjects,
-    noise: SensorNoise,
-    goal: Goal,
+    worth: Worth,
     *,
     margin: float = MARGIN,
-    offset_guard: float = 0.0,
-    height: float = 0.0,
-    pad: float = 0.0,
     criterion: Criterion = "information",
     rng: np.random.Generator | None = None,
 ) -> Ranking:
     """Refuse and rank.
 
     Args:
-        samples: Objects drawn from the belief.
+        worth: By what touches are valued; bound and predicted covariance do not reckon with its
+            untold rotation.
         margin: Smallest margin from a singularity; zero ranks all, and so do the criteria that
             refuse nothing.
-        offset_guard: Sd of a common rotation of the directions that the expected error reckons
-            with beside what the sensor admits [rad]; bound and predicted covariance do not.
-        height: Of the later grasp above the believed axis' point: where the offset counts [m].
-        pad: Radius of the hand's pads [m].
         rng: For the criterion `random` only.
     """
-    worth = Worth(belief, samples, noise, goal, height, untold=offset_guard, pad=pad)
+    belief, noise, goal = worth.belief, worth.noise, worth.goal
     place = belief.surface.at(candidates.theta, candidates.z)
     landed = worth.landed(place)
     after = worth.covariances(landed)
