@@ -73,6 +73,7 @@ class HandCollision:
         self._shape_data = pin.GeometryData(self._shapes)
         _start_afresh(self._shape_data)
         self._geometries = [shape.geometry for shape in self._shapes.geometryObjects]
+        self._roots = _roots(hand, self._shapes)
         self._placed: tuple[Array, list[coal.Transform3s]] | None = None
 
     def is_self_free(self, q: ArrayLike) -> bool:
@@ -132,6 +133,7 @@ class HandCollision:
         placed, there = self._placements(q), _transform(X_WB.inverse() * body.X_WO)
         pads = zip(self._pad_ids, self.hand.fingers, strict=True)
         exempt = {i for i, finger in pads if finger.name in touching}
+        exempt |= self._roots if body.still else set()
         around = body.parts if body.around is None else (body.around,)
         bounds = [
             (self._distance(i, placed, around, there), i) for i in self._outer if i not in exempt
@@ -145,6 +147,15 @@ class HandCollision:
                 exact = self._distance(i, placed, body.parts, there)
                 least, nearest = min((least, nearest), (exact, i))
         return LinkPair(self._part(nearest), body.name, least)
+
+    def root_in(self, body: Body) -> LinkPair | None:
+        """What of an arm's root stands in a body, deepest; None where nothing does."""
+        if not self._roots or self.hand.arm is None:
+            return None
+        placed, X_WA = self._placements(self.hand.home), self.hand.arm.X_WA
+        there = _transform(X_WA.inverse() * body.X_WO)
+        depth, link = min((self._distance(i, placed, body.parts, there), i) for i in self._roots)
+        return LinkPair(self._link(link), body.name, depth) if depth < 0.0 else None
 
     def _placements(self, q: ArrayLike) -> list[coal.Transform3s]:
         """Where each shape is in B; kept until the joints move."""
@@ -235,6 +246,13 @@ def _frustum_faces() -> coal.StdVec_Triangle:
         faces.append(coal.Triangle(0, i + 1, i))
         faces.append(coal.Triangle(n, n + i, n + i + 1))
     return faces
+
+
+def _roots(hand: Hand, shapes: pin.GeometryModel) -> set[int]:
+    """Shapes that no joint moves: those of an arm's root; the base of a hand alone moves."""
+    if hand.arm is None:
+        return set()
+    return {i for i, shape in enumerate(shapes.geometryObjects) if int(shape.parentJoint) == 0}
 
 
 def _start_afresh(data: pin.GeometryData) -> None:

@@ -9,7 +9,7 @@ joint angles and the base pose that nearly make them; `reach` makes them exact.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
@@ -21,12 +21,14 @@ from hand_models.spheres import LinkSpheres
 from planner.reaching.clear import clear_of
 from planner.reaching.laying import Laid, lay
 from planner.reaching.reach_map import ReachMap
+from planner.reaching.turning import Room, clear_turns, evenly, turned
 from planner.reaching.workspace import Workspace
 
 END_MARGIN = 0.08  # of the believed height, kept from both ends
 FITTING = 5  # steps from a cylinder to the believed surface
-TURNS = 48  # about the object's axis, where the base is bounded
+TURNS, IN_ROOM = 48, 16  # about the object's axis, for a bounded base and for a free one
 GAP = 2e-3  # of a laid pad from the surface that reach will close [m]
+FREE, EMPTY = Workspace(), Room()
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +78,8 @@ def placement_candidates(
     *,
     count: int,
     rng: np.random.Generator,
-    workspace: Workspace | None = None,
+    workspace: Workspace = FREE,
+    room: Room = EMPTY,
     fingers_at_once: int = 3,
 ) -> Candidates:
     """Placements with several fingers on the surface at once.
@@ -85,82 +88,77 @@ def placement_candidates(
         reach_map: Of the hand; its cone holds here, too.
         count: How many of its placements are fitted to the surface.
         fingers_at_once: Contacts per placement, at most the hand's fingers.
-        workspace: Where the hand's base may be; free where None.
+        workspace: Where the hand's base may be.
+        room: What stands about the object.
     """
     hand, cone = reach_map.hand, reach_map.cone
     poses, fingers = reach_map.draw(surface, fingers_at_once, count=count, rng=rng)
     laid = lay(hand, surface, poses, fingers, cone=cone, iterations=FITTING)
-    return _kept(hand, fingers, reach_map.spheres, surface, laid, cone, workspace or Workspace())
+    return _kept(reach_map, surface, fingers, laid, workspace, room)
 
 
 def _kept(
-    hand: Hand,
-    fingers: Index,
-    spheres: LinkSpheres,
+    reach_map: ReachMap,
     surface: SurfaceOfRevolution,
+    fingers: Index,
     laid: Laid,
-    cone: float,
     workspace: Workspace,
+    room: Room,
 ) -> Candidates:
     """The placements that hold, and a count of those that do not, by reason."""
-    laid = _turned_towards(workspace, surface, laid)
-    q = laid.q
     low, high = surface.profile.z_range
     margin = END_MARGIN * (high - low)
-    frame = surface.frame
-    R_WB = np.einsum("ji,njk->nik", frame, laid.R_OB)
-    p_WB = surface.axis.point + laid.p_OB @ frame
-    tests = (
+    alive, told = _passed(
+        len(laid.q),
         ("pads off the surface", np.all(np.abs(laid.gap) < GAP, axis=1)),
-        ("pad turned away", np.all(laid.pad_angle < cone, axis=1)),
+        ("pad turned away", np.all(laid.pad_angle < reach_map.cone, axis=1)),
         ("beyond the ends", np.all((laid.z > low + margin) & (laid.z < high - margin), axis=1)),
-        ("base outside its workspace", workspace.allows(R_WB, p_WB)),
     )
-    alive = np.arange(len(q))
-    rejected = [("placements fitted", len(q))]
-    for reason, passed in tests:
-        rejected.append((reason, int(np.sum(~passed[alive]))))
-        alive = alive[passed[alive]]
-    free = clear_of_object(hand, spheres, surface, q[alive], R_WB[alive], p_WB[alive])
-    rejected.append(("links inside the object", int(np.sum(~free))))
-    alive = alive[free]
+    fingers, laid = fingers[alive], laid.take(alive)
+    spheres = reach_map.spheres
+    free = clear_of(reach_map.hand, spheres, surface.profile, laid.q, laid.R_OB, laid.p_OB)
+    R_WB, p_WB, theta, within, clear = _turned_best(reach_map, surface, laid, workspace, room)
+    alive, more = _passed(
+        len(laid.q),
+        ("links inside the object", free),
+        ("base outside its workspace", within),
+        ("in the table or a box, turned whichever way", clear),
+    )
+    rejected = (("placements fitted", len(free) + sum(n for _, n in told)), *told, *more)
     return Candidates(
-        fingers[alive],
-        q[alive],
-        R_WB[alive],
-        p_WB[alive],
-        laid.theta[alive],
-        laid.z[alive],
-        laid.pad_angle[alive],
-        tuple(rejected),
-    )
+        fingers, laid.q, R_WB, p_WB, theta, laid.z, laid.pad_angle, rejected
+    ).take(alive)  # fmt: skip
 
 
-def _turned_towards(workspace: Workspace, surface: SurfaceOfRevolution, laid: Laid) -> Laid:
-    """Placements turned about the object's axis to where the base is nearest to its workspace.
+def _passed(count: int, *tests: tuple[str, Mask]) -> tuple[Index, tuple[tuple[str, int], ...]]:
+    """What passes all tests, and how many each refused of those that had passed so far."""
+    alive, told = np.arange(count), []
+    for reason, passed in tests:
+        told.append((reason, int(np.sum(~passed[alive]))))
+        alive = alive[passed[alive]]
+    return alive, tuple(told)
 
-    On a surface of revolution that changes nothing else.
+
+def _turned_best(
+    reach_map: ReachMap, surface: SurfaceOfRevolution, laid: Laid, workspace: Workspace, room: Room
+) -> tuple[Array, Array, Array, Mask, Mask]:
+    """Poses of the base (N, 3, 3), (N, 3) and angles of the contacts (N, m) after the best turn
+    about the object's axis; whether the base is then in its workspace and clear of the room, (N,).
+
+    As it was laid, if that will do and nothing draws it elsewhere.
     """
-    if workspace.X_WB is None:
-        return laid
-    angle = np.arange(TURNS) * (2.0 * np.pi / TURNS)
-    c, s, zero, one = np.cos(angle), np.sin(angle), np.zeros(TURNS), np.ones(TURNS)
-    turns = np.stack([c, -s, zero, s, c, zero, zero, zero, one], axis=1).reshape(-1, 3, 3)
-    X = workspace.X_WB
-    R_OB = np.einsum("kij,njm->knim", turns, laid.R_OB)
-    p_OB = np.einsum("kij,nj->kni", turns, laid.p_OB)
-    R_WB = np.einsum("ji,knjm->knim", surface.frame, R_OB)
-    p_WB = surface.axis.point + p_OB @ surface.frame
-    off = workspace.violation(R_WB.reshape(-1, 3, 3), p_WB.reshape(-1, 3)).reshape(TURNS, -1)
-    near = np.linalg.norm(p_WB - X.translation, axis=2) - np.einsum("ij,knij->kn", X.rotation, R_WB)
-    best = np.argmin(off + 1e-6 * near, axis=0)
-    rows = np.arange(len(best))
-    return replace(
-        laid,
-        R_OB=R_OB[best, rows],
-        p_OB=p_OB[best, rows],
-        theta=np.angle(np.exp(1j * (laid.theta + angle[best, None]))),
-    )
+    free = workspace.X_WB is None
+    angles = evenly(TURNS if not free else 1 if room.is_empty else IN_ROOM)
+    R, p = turned(surface, laid.R_OB, laid.p_OB, angles)
+    within = workspace.allows(R, p)
+    clear = clear_turns(room, reach_map.hand, reach_map.spheres, laid.q, R, p)
+    cost = workspace.distance(R, p) + 1e3 * ~within + 1e2 * ~clear
+    best, rows = np.argmin(cost, axis=0), np.arange(len(laid.q))
+    theta = np.angle(np.exp(1j * (laid.theta + angles[best, None])))
+    return (
+        R[best, rows], p[best, rows], theta, within[best, rows],
+        clear[best, rows] | ~within[best, rows],
+    )  # fmt: skip
 
 
 def clear_of_object(
@@ -183,7 +181,8 @@ def single_candidates(
     *,
     count: int,
     rng: np.random.Generator,
-    workspace: Workspace | None = None,
+    workspace: Workspace = FREE,
+    room: Room = EMPTY,
 ) -> Candidates:
     """Placements of the hand with one finger on the surface: every place an arm can bring it to.
 
@@ -216,7 +215,7 @@ def single_candidates(
         gap=np.zeros((count, 1)),
         pad_angle=np.arccos(np.clip(-np.sum(inward * place.n, axis=1), -1.0, 1.0))[:, None],
     )
-    return _kept(hand, fingers, reach_map.spheres, surface, laid, cone, workspace or Workspace())
+    return _kept(reach_map, surface, fingers, laid, workspace, room)
 
 
 def _in_disc(count: int, rng: np.random.Generator) -> Array:

@@ -6,9 +6,11 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
+import pinocchio as pin
 
 from estimator.belief import Belief
 from estimator.surface import SurfaceOfRevolution
+from estimator.vectors import Array
 from hand_models.arm import Arm
 from hand_models.collision import HandCollision
 from hand_models.hand import Hand
@@ -16,11 +18,17 @@ from hand_models.postures import Postures, posture_library
 from hand_models.spheres import LinkSpheres, link_spheres
 from planner.candidates import Candidates, placement_candidates, single_candidates
 from planner.motions.retreat import Retreat, ways_out
-from planner.reaching.arm_reach import ArmReach
+from planner.motions.surroundings import fixed_bodies, object_body
+from planner.reaching.arm_reach import ArmReach, Standing
+from planner.reaching.clear import INTRUSION
 from planner.reaching.reach import Reach, ReachSolver
 from planner.reaching.reach_map import ReachMap
 from planner.reaching.reach_task import ReachOptions
+from planner.reaching.solid import believed_solid
+from planner.reaching.turning import Room
 from planner.reaching.workspace import Workspace
+
+BOLTED = 0.02  # how deep an arm's root may stand in what it is bolted to [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,17 +65,37 @@ class HandTools:
         self, surface: SurfaceOfRevolution, fingers: int, *, count: int, rng: np.random.Generator
     ) -> Candidates:
         """About so many placements with so many fingers on the surface, brought by the arm."""
-        workspace = self.rules.workspace if self.arm is None else self.arm.around
+        room = Room(self.rules.table, self.rules.boxes)
+        workspace = self.rules.workspace if self.arm is None else Workspace()
         if fingers == 1:
             laid = single_candidates(
-                self.reach_map, surface, workspace=workspace, count=count, rng=rng
+                self.reach_map, surface, workspace=workspace, room=room, count=count, rng=rng
             )
         else:
             laid = placement_candidates(
-                self.reach_map, surface, workspace=workspace, count=count, rng=rng,
+                self.reach_map, surface, workspace=workspace, room=room, count=count, rng=rng,
                 fingers_at_once=fingers,
             )  # fmt: skip
-        return laid if self.arm is None else self.arm.placements(laid)
+        if self.arm is None:
+            return laid
+        return self.arm.placements(laid, surface, room, self._standing(surface))
+
+    def _standing(self, surface: SurfaceOfRevolution) -> Standing:
+        """Says what hand and arm meet in a posture; the object coarsely, as reach goes on."""
+        root = self.rules.workspace.X_WB or pin.SE3.Identity()
+        bodies = [(body, 0.0) for body in fixed_bodies(self.rules.table, self.rules.boxes)]
+        bodies.append((object_body(believed_solid(surface)), -INTRUSION))
+
+        def in_the_way(q: Array) -> str | None:
+            if not self.collision.is_self_free(q):
+                return "the arm folded into itself or the hand"
+            for body, least in bodies:
+                pair = self.collision.nearest_to(q, root, body)
+                if pair.distance < least:
+                    return f"{pair.first} in {body.name}"
+            return None
+
+        return in_the_way
 
     def ways_out(self, belief: Belief, reach: Reach) -> tuple[Retreat, ...]:
         """Of the whole, from a reach's stand-off; a free hand's base is the reach's there."""
@@ -83,8 +111,13 @@ class HandTools:
 
 @lru_cache(maxsize=8)
 def hand_tools(hand: Hand, options: ReachOptions) -> HandTools:
-    """The tools of a hand under these rules; equal arguments give the same object."""
+    """The tools of a hand under these rules; equal arguments give the same object.
+
+    Raises:
+        ValueError: The root of an arm stands in the table or a box.
+    """
     options = within_wrist(hand, options)
+    require_room(hand, options)
     alone = hand if hand.arm is None else hand.arm.hand
     postures, spheres, collision = posture_library(alone), link_spheres(alone), HandCollision(alone)
     reach_map = ReachMap(alone, postures, spheres, collision, cone=options.cone)
@@ -99,6 +132,20 @@ def hand_tools(hand: Hand, options: ReachOptions) -> HandTools:
         hand, rules, postures, link_spheres(hand), HandCollision(hand), reach_map,
         solver, single, ArmReach(hand.arm),
     )  # fmt: skip
+
+
+def require_room(hand: Hand, options: ReachOptions) -> None:
+    """Raises ValueError if the root of an arm stands in the table or a box."""
+    if hand.arm is None or not (options.boxes or options.table):
+        return
+    collision = HandCollision(hand)
+    for body in fixed_bodies(options.table, options.boxes):
+        pair = collision.root_in(body)
+        if pair is not None and pair.distance < -BOLTED:
+            raise ValueError(
+                f"{pair.first}, the root of the arm, stands {-1e3 * pair.distance:.0f} mm deep in "
+                f"{body.name}: one of them is not where it is said to be"
+            )
 
 
 def within_wrist(hand: Hand, options: ReachOptions) -> ReachOptions:

@@ -14,7 +14,7 @@ from planner.motions.timing import MotionLimits
 from planner.motions.trajectory import Configuration
 from planner.reaching.reach_task import ReachOptions
 
-OFFSET_GUARD = float(np.deg2rad(5.0))
+OFFSET_GUARD = float(np.deg2rad(2.0))
 
 
 @dataclass(frozen=True, eq=False)

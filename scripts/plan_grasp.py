@@ -49,6 +49,7 @@ from hand_models.hand import Hand
 from planner.explore import Step, explore
 from planner.goal import Goal
 from planner.grasping.grasp import GraspOptions
+from planner.hand_tools import require_room
 from planner.messages import plan_document
 from planner.options import PlannerOptions
 from planner.plan import NoPlan, Probe
@@ -113,6 +114,8 @@ def _scenario(options: Options) -> Scenario:
         raise ValueError(
             f"--wrist-mm: {hand.name} is held by its arm; its description says where that stands"
         )
+    planner = from_home(hand, planner_options(options))
+    require_room(hand, planner.reach)
     return Scenario(
         surface=surface,
         belief=belief_by(
@@ -126,7 +129,7 @@ def _scenario(options: Options) -> Scenario:
         world=build_world(options.world, hand, surface, options.sensor, rng),
         hand=hand,
         goal=Goal(np.deg2rad(options.goal_angle_deg), 1e-3 * options.goal_offset_mm),
-        planner=from_home(hand, planner_options(options)),
+        planner=planner,
         grasp=grasp_options(options),
     )
 

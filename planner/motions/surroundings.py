@@ -109,11 +109,18 @@ def surroundings(
         table: (a, b, c, h): below a x + b y + c z = h is the table; None for none.
         boxes: Other obstacles.
     """
-    fixed = [Body(box.name, (coal.Box(*box.size),), box.pose) for box in boxes]
+    return Surroundings(collision, object_body(solid), fixed_bodies(table, boxes))
+
+
+def fixed_bodies(
+    table: tuple[float, float, float, float] | None, boxes: tuple[Box, ...]
+) -> tuple[Body, ...]:
+    """Table and boxes, which stand as still as the root of an arm does."""
+    fixed = [Body(box.name, (coal.Box(*box.size),), box.pose, still=True) for box in boxes]
     if table is not None:
         below = coal.Halfspace(np.array(table[:3]), table[3])
-        fixed.insert(0, Body("the table", (below,), pin.SE3.Identity()))
-    return Surroundings(collision, object_body(solid), tuple(fixed))
+        fixed.insert(0, Body("the table", (below,), pin.SE3.Identity(), still=True))
+    return tuple(fixed)
 
 
 def object_body(solid: RevolvedSolid) -> Body:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from hand_models.collision import HandCollision, LinkPair
+from hand_models.collision import HandCollision
 from hand_models.hand import Hand
+from planner.motions.surroundings import fixed_bodies
 from planner.reaching.certificate import Certificate, Tolerances, certify, faults, gap_in_words
 from planner.reaching.reach_task import ReachOptions, ReachTask, Solution
 
@@ -52,7 +52,7 @@ def inspect(hand: Hand, collision: HandCollision, task: ReachTask, found: Soluti
         wrong = faults(hand, before, found.q_standoff, fingers, wide)
         said.extend(f"at stand-off: {fault}" for fault in wrong)
     for share in (0.0, *shares):
-        said.extend(_table_faults(hand, collision, options, found, share))
+        said.extend(_room_faults(hand, collision, options, found, share))
     if not by_arm and np.any(found.overshoot):
         said.extend(_pressing_faults(hand, collision, options, found))
     return Inspection(at, before, tuple(said))
@@ -99,20 +99,18 @@ def _posture(found: Solution, share: float) -> tuple[Array, pin.SE3]:
     return (found.q if share == 0.0 else found.q_standoff), X_WB
 
 
-def _table_faults(
+def _room_faults(
     hand: Hand, collision: HandCollision, options: ReachOptions, found: Solution, share: float
 ) -> Iterator[str]:
-    if options.table is None:
-        return
-    *normal, height = options.table
-    below = coal.Halfspace(np.array(normal), height)
-    near = collision.object_clearance(*_posture(found, share), [below], pin.SE3.Identity())
-    link, distance = near.nearest()
-    if distance < options.clearance:
-        yield gap_in_words(LinkPair(link, "the table", distance))
-    for finger, pad in zip(hand.fingers, near.pads, strict=True):
-        if pad < 0.0:
-            yield gap_in_words(LinkPair(f"the pad of {finger.name}", "the table", float(pad)))
+    """Links too near to table or boxes; pads may be as near as they like, but not in them."""
+    pads = {finger.name for finger in hand.fingers}
+    for body in fixed_bodies(options.table, options.boxes):
+        where = _posture(found, share)
+        link, anything = (collision.nearest_to(*where, body, touching=t) for t in (pads, ()))
+        if link.distance < options.clearance:
+            yield gap_in_words(link)
+        elif anything.distance < 0.0:
+            yield gap_in_words(anything)
 
 
 def _pressing_faults(

@@ -44,6 +44,12 @@ class Laid:
     gap: Array
     pad_angle: Array
 
+    def take(self, index: Index) -> Laid:
+        return Laid(
+            self.q[index], self.R_OB[index], self.p_OB[index], self.theta[index],
+            self.z[index], self.gap[index], self.pad_angle[index],
+        )  # fmt: skip
+
 
 @dataclass(frozen=True, eq=False)
 class Poses:

@@ -41,7 +41,7 @@ class ReachOptions:
         clearance: Between object and links that do not touch [m].
         self_clearance: Between links [m].
         table: (a, b, c, h): half-space a x + b y + c z >= h the hand must stay in; None for none.
-        boxes: Obstacles that a motion must not meet.
+        boxes: Obstacles that neither hand nor arm may meet.
         standoff: How far before the contact the fingers retreat, if they can [m].
         least_standoff: How far they must [m].
         overshoot: How far behind the contact they can press on, if they can [m].

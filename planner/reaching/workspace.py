@@ -42,15 +42,26 @@ class Workspace:
         return self.X_WB is not None and self.position_range == self.rotation_range == 0.0
 
     def allows(self, R_WB: Array, p_WB: Array) -> NDArray[np.bool_]:
-        """(N,) which of the poses R (N, 3, 3), p (N, 3) are in range."""
+        """(...) which of the poses R (..., 3, 3), p (..., 3) are in range."""
         return self.violation(R_WB, p_WB) <= 1e-6
 
     def violation(self, R_WB: Array, p_WB: Array) -> Array:
-        """(N,) how far poses are out of range, a turn counted as an arc of 0.1 m radius [m]."""
+        """(...) how far poses are out of range, a turn counted as an arc of 0.1 m radius [m]."""
         if self.X_WB is None:
-            return np.zeros(len(R_WB))
+            return np.zeros(p_WB.shape[:-1])
         out = np.maximum(np.abs(p_WB - self.X_WB.translation) - self.position_range, 0.0)
-        cosine = (np.einsum("ij,nij->n", self.X_WB.rotation, R_WB) - 1.0) / 2.0
-        turn = np.arccos(np.clip(cosine, -1.0, 1.0))
-        excess = np.maximum(turn - self.rotation_range, 0.0)
-        return np.asarray(np.linalg.norm(out, axis=1) + _LENGTH_PER_TURN * excess)
+        excess = np.maximum(self._turn(R_WB) - self.rotation_range, 0.0)
+        return np.asarray(np.linalg.norm(out, axis=-1) + _LENGTH_PER_TURN * excess)
+
+    def distance(self, R_WB: Array, p_WB: Array) -> Array:
+        """(...) how far poses are from the nominal one, turns as above; zero without one [m]."""
+        if self.X_WB is None:
+            return np.zeros(p_WB.shape[:-1])
+        away = np.linalg.norm(p_WB - self.X_WB.translation, axis=-1)
+        return np.asarray(away + _LENGTH_PER_TURN * self._turn(R_WB))
+
+    def _turn(self, R_WB: Array) -> Array:
+        """(...) from the nominal orientation [rad]."""
+        assert self.X_WB is not None
+        cosine = (np.einsum("ij,...ij->...", self.X_WB.rotation, R_WB) - 1.0) / 2.0
+        return np.asarray(np.arccos(np.clip(cosine, -1.0, 1.0)))
