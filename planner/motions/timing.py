@@ -27,6 +27,8 @@ _DENSE = 400  # times at which the motion is measured
 _UNBOUNDED = 1e3  # acceleration that is never reached
 _SAME = 1e-9  # of points of a path that are one
 
+Norms = list[tuple[slice, float]]  # columns of a path and the largest norm of their rates
+
 
 @dataclass(frozen=True)
 class MotionLimits:
@@ -94,9 +96,11 @@ def timed(
         return None
     place = length[kept] / length[-1]
     told = np.empty((len(place), 0)) if tips is None else tips[kept].reshape(len(place), -1)
-    motion = _motion(np.hstack([path[kept], place[:, None], told]), hand, limits, phase)
+    points = np.hstack([path[kept], place[:, None], told])
+    norms = _norms(hand, points.shape[1], limits, phase)
+    motion = _motion(points, hand, limits, norms)
     at = None if mark is None else float(np.interp(mark, np.flatnonzero(kept), place))
-    times, slower = _waypoints(hand, motion, at), _slower(hand, motion, limits)
+    times, slower = _waypoints(hand, motion, at), _slower(hand, motion, limits, norms)
     nq, rows = hand.model.nq, motion(times)
     return Trajectory(
         phase=phase,
@@ -109,24 +113,31 @@ def timed(
     )
 
 
-def _slower(hand: Hand, motion: Any, limits: MotionLimits) -> float:
+def _slower(hand: Hand, motion: Any, limits: MotionLimits, norms: Norms) -> float:
     """By how much time has to be stretched for what the optimiser's grid did not see."""
     times, n = np.linspace(0.0, float(motion.duration), _DENSE), hand.model.nq
-    speed = np.max(np.abs(motion(times, 1)[:, :n]) / limits.joint_speeds(hand))
+    velocity = motion(times, 1)
+    speed = np.max(np.abs(velocity[:, :n]) / limits.joint_speeds(hand))
+    for part, most in norms:
+        speed = max(speed, np.max(np.linalg.norm(velocity[:, part], axis=1)) / most)
     gain = np.max(np.abs(motion(times, 2)[:, :n])) / limits.joint_acceleration
     return float(max(1.0, speed, np.sqrt(gain)))
 
 
-def _motion(path: Array, hand: Hand, limits: MotionLimits, phase: Phase) -> Any:
+def _norms(hand: Hand, columns: int, limits: MotionLimits, phase: Phase) -> Norms:
+    """Which columns together may change how fast: base, quaternion, tips."""
+    n, near = hand.model.nq, min(limits.near_speed, limits.base_speed)
+    base = limits.base_speed if phase == "transfer" else near
+    tip = limits.touch_speed if phase in ("approach", "close") else near
+    tips = [(slice(k, k + 3), tip) for k in range(n + 8, columns, 3)]
+    return [(slice(n, n + 3), base), (slice(n + 3, n + 7), limits.base_turn / 2.0), *tips]
+
+
+def _motion(path: Array, hand: Hand, limits: MotionLimits, norms: Norms) -> Any:
     """The spline through the path's points, in time. Column nq + 7 is the place along it."""
     from planner.motions.fastest import fastest  # half a second, for who moves
 
     n, more = hand.model.nq, path.shape[1] - hand.model.nq - 7
-    near = min(limits.near_speed, limits.base_speed)
-    base = limits.base_speed if phase == "transfer" else near
-    norms = [(slice(n, n + 3), base), (slice(n + 3, n + 7), limits.base_turn / 2.0)]
-    tip = limits.touch_speed if phase in ("approach", "close") else near
-    norms += [(slice(k, k + 3), tip) for k in range(n + 8, path.shape[1], 3)]
     most = np.concatenate([
         np.full(n, limits.joint_acceleration),
         np.full(3, limits.base_acceleration / np.sqrt(3.0)),

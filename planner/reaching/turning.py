@@ -41,15 +41,15 @@ class Room:
 
     def distance(self, points: Array) -> Array:
         """Of points (..., 3) from the nearest thing, negative within; infinite in an empty room."""
-        least: Array = np.full(points.shape[:-1], np.inf)
+        things = [np.full(points.shape[:-1], np.inf)]
         if self.table is not None:
-            least = np.asarray(points @ np.array(self.table[:3]) - self.table[3])
+            things.append(points @ np.array(self.table[:3]) - self.table[3])
         for box in self.boxes:
             local = (points - box.pose.translation) @ box.pose.rotation
             beyond = np.abs(local) - 0.5 * np.array(box.size)
-            outside: Array = np.linalg.norm(np.maximum(beyond, 0.0), axis=-1)
-            least = np.minimum(least, outside + np.minimum(beyond.max(axis=-1), 0.0))
-        return least
+            outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=-1)
+            things.append(outside + np.minimum(beyond.max(axis=-1), 0.0))
+        return np.asarray(np.min(things, axis=0))
 
 
 def evenly(count: int) -> Array:
