@@ -26,6 +26,7 @@ GAIN = 0.25  # of a joint's speed between waypoints, at most [rad/s]
 _DENSE = 400  # times at which the motion is measured
 _UNBOUNDED = 1e3  # acceleration that is never reached
 _SAME = 1e-9  # of points of a path that are one
+_KEPT = 0.98  # of a tip's speed: splines of joints and of tips are not quite one motion
 
 Norms = list[tuple[slice, float]]  # columns of a path and the largest norm of their rates
 
@@ -129,7 +130,7 @@ def _norms(hand: Hand, columns: int, limits: MotionLimits, phase: Phase) -> Norm
     n, near = hand.model.nq, min(limits.near_speed, limits.base_speed)
     base = limits.base_speed if phase == "transfer" else near
     tip = limits.touch_speed if phase in ("approach", "close") else near
-    tips = [(slice(k, k + 3), tip) for k in range(n + 8, columns, 3)]
+    tips = [(slice(k, k + 3), _KEPT * tip) for k in range(n + 8, columns, 3)]
     return [(slice(n, n + 3), base), (slice(n + 3, n + 7), limits.base_turn / 2.0), *tips]
 
 

@@ -54,7 +54,7 @@ class Room:
 
 def evenly(count: int) -> Array:
     """(count,) turns about the axis; the first is none [rad]."""
-    return np.arange(count) * (2.0 * np.pi / count)
+    return np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
 
 
 def turned(
