@@ -1,5 +1,6 @@
 """Where to touch: contacts that this hand can make, chosen by what they would tell."""
 
+from planner.carrying import Stop
 from planner.explore import Step, explore
 from planner.goal import Goal
 from planner.motions.surroundings import Box
@@ -21,6 +22,7 @@ __all__ = [
     "Probe",
     "ReachOptions",
     "Step",
+    "Stop",
     "Trajectory",
     "Workspace",
     "explore",

@@ -5,12 +5,13 @@ do, and the hand moves between. Where the object is so vaguely known that most p
 miss with a finger, one finger feels for it first. Where several axes are left, or the first touches
 meet the goal with nothing to confirm them, or placements agree and one more touch is likely to meet
 it, a single touch follows (`planner.next_touch`). Touches that contradict earlier ones widen the
-belief (`planner.surprise`), and others have to agree before the goal counts.
+belief (`planner.surprise`), and others have to agree before the goal counts. What the hand meets on
+its way in counts as a touch, and ends the placement (`planner.carrying`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -19,6 +20,7 @@ import numpy as np
 from estimator.belief import Belief
 from estimator.contact import Contact, Miss, SensorNoise
 from hand_models.hand import Hand
+from planner.carrying import Move, Stop, Touch, carry_out
 from planner.choosing.risk import MISSED
 from planner.goal import Goal
 from planner.motions.trajectory import Configuration
@@ -30,8 +32,6 @@ from planner.surprise import Learnt, learn
 UNLIKELY = 0.5  # chance of a miss from which a placement is not worth its three touches
 TELLING_TRIES = 6  # best single touches that are handed to the optimiser
 
-Touch = Callable[[Probe], Contact | Miss]
-
 
 @dataclass(frozen=True, eq=False)
 class Step:
@@ -39,10 +39,11 @@ class Step:
 
     Args:
         plan: The probes.
-        outcomes: A contact or a miss for each probe.
+        outcomes: A contact or a miss for each probe; none where a motion was stopped before.
         before, after: The belief.
-        touches: All probes made so far.
+        touches: All that was felt or missed so far.
         surprise: What the touches contradicted and what was done about it; None where nothing.
+        stop: The motion that met something, and what was felt; None where all were carried out.
     """
 
     plan: Plan
@@ -51,6 +52,26 @@ class Step:
     after: Belief
     touches: int
     surprise: str | None = None
+    stop: Stop | None = None
+
+    @property
+    def probes(self) -> tuple[Probe, ...]:
+        """Those of the plan that were made: all of them, or none."""
+        return self.plan.probes[: len(self.outcomes)]
+
+    @property
+    def felt(self) -> tuple[tuple[str, Contact | Miss], ...]:
+        """Each finger that touched or missed, in order; what stopped the hand, too."""
+        if self.stop is not None:
+            return ((self.stop.finger, self.stop.felt),)
+        return tuple((p.finger, felt) for p, felt in zip(self.probes, self.outcomes, strict=True))
+
+    @property
+    def left(self) -> Configuration:
+        """Where the hand is after it."""
+        if self.stop is not None:
+            return self.stop.trajectory.begin
+        return Configuration(self.plan.retreat.path[-1], self.plan.retreat.bases[-1])
 
 
 def explore(
@@ -63,12 +84,15 @@ def explore(
     budget: int,
     rng: np.random.Generator,
     options: PlannerOptions | None = None,
+    move: Move | None = None,
 ) -> Iterator[Step]:
     """Touch until the axis is known well enough or the budget of touches is spent.
 
     Args:
-        touch: Carries a probe out: a simulated sensor, a physics engine or a robot.
+        touch: Carries a probe out, there and back: a simulated sensor, a physics engine or a robot.
         budget: Largest number of probes, misses included.
+        move: Carries out what lies between probes, or says what stopped it; asked for what
+            `options.start` lets the planner plan. None where somebody else moves the hand.
     Raises:
         NoPlan: The hand reaches nothing useful on the believed object.
         ValueError: A budget below one.
@@ -85,18 +109,14 @@ def explore(
             if goal.met_by(before):
                 return  # nothing to confirm it with is within reach
             raise
-        outcomes = tuple(touch(probe) for probe in plan.probes)
-        touches += len(outcomes)
-        learnt = learn(learnt, outcomes)
-        options = _moved(options, plan)
-        yield Step(plan, outcomes, before, learnt.belief, touches, learnt.surprise)
-
-
-def _moved(options: PlannerOptions, plan: Plan) -> PlannerOptions:
-    """The options for the next placement: the hand is where the last left it."""
-    if plan.motion is None:
-        return options
-    return replace(options, start=Configuration(plan.retreat.path[-1], plan.retreat.bases[-1]))
+        outcomes, stop = carry_out(plan, touch, move)
+        felt = outcomes if stop is None else (stop.felt,)
+        touches += len(felt)
+        learnt = learn(learnt, felt)
+        step = Step(plan, outcomes, before, learnt.belief, touches, learnt.surprise, stop)
+        if plan.motion is not None:
+            options = replace(options, start=step.left)
+        yield step
 
 
 def _plan(

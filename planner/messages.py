@@ -18,6 +18,7 @@ import pinocchio as pin
 from estimator.contact import Contact, Miss
 from estimator.records import axis_record, contact_record, estimate_record
 from hand_models.hand import Hand
+from planner.carrying import Stop
 from planner.choosing.optimum import ChoiceCertificate
 from planner.explore import Step
 from planner.grasping.grasp_outcome import Grasp
@@ -149,12 +150,22 @@ def step_record(step: Step) -> dict[str, Any]:
         "touches": step.touches,
         "outcomes": [
             outcome_record(probe.finger, outcome)
-            for probe, outcome in zip(step.plan.probes, step.outcomes, strict=True)
+            for probe, outcome in zip(step.probes, step.outcomes, strict=True)
         ],
+        "stopped": None if step.stop is None else stop_record(step.stop),
         "surprise": step.surprise,
         "expected_error": {"angle": step.plan.angle, "offset": step.plan.offset},
         "axis": axis_record(step.after.hypotheses[0]),
         "estimate": estimate_record(estimate) if estimate is not None else None,
+    }
+
+
+def stop_record(stop: Stop) -> dict[str, Any]:
+    """A motion that met something, and what was felt then."""
+    return {
+        "phase": stop.trajectory.phase,
+        "time": stop.time,
+        **outcome_record(stop.finger, stop.felt),
     }
 
 

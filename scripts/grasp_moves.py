@@ -9,11 +9,12 @@ import numpy as np
 import pinocchio as pin
 
 from hand_models.hand import Hand
+from planner.carrying import Stop
 from planner.explore import Step
 from planner.grasping.grasp import Grasp
 from planner.grasping.grasp_travel import GraspMotion, closing_motion
 from planner.hand_tools import within_wrist
-from planner.motions.round_motion import withdrawal
+from planner.motions.round_motion import RoundMotion, withdrawal
 from planner.motions.timing import MotionLimits
 from planner.motions.trajectory import Array, Configuration, Trajectory
 from planner.options import PlannerOptions
@@ -34,18 +35,12 @@ def from_home(hand: Hand, options: PlannerOptions) -> PlannerOptions:
     return replace(options, start=Configuration(hand.home, X_WB))
 
 
-def left_at(steps: Sequence[Step], start: Configuration | None) -> Configuration | None:
-    """Where the last placement left the hand."""
-    if not steps:
-        return start
-    way = steps[-1].plan.retreat
-    return Configuration(way.path[-1], way.bases[-1])
-
-
 def act_motions(
     hand: Hand, limits: MotionLimits, step: Step, records: Sequence[TouchRecord]
 ) -> list[ActMotion | None]:
     """One placement as it went: each finger up to where it stopped, and back from there."""
+    if step.stop is not None:
+        return [_stopped(step.plan.motion, step.stop)]
     motion = step.plan.motion
     if motion is None:
         return [None] * len(step.plan.probes)
@@ -61,6 +56,16 @@ def act_motions(
             return [None] * len(records)
         acts.append(ActMotion(move(come), gone, move(back)))
     return acts
+
+
+def _stopped(motion: RoundMotion | None, stop: Stop) -> ActMotion | None:
+    """Up to where something ended the motion, and back."""
+    met = stop.trajectory.until(stop.time)
+    way = move([met])
+    if way is None or motion is None:
+        return None
+    come = [motion.transfer] if stop.trajectory.phase == "enter" else []
+    return ActMotion(move(come), way, move([met.reversed("withdraw")]))
 
 
 def grip_motion(hand: Hand, grasp: Grasp, motion: GraspMotion, path: Array, words: str) -> Grip:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pinocchio as pin
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
@@ -17,6 +18,8 @@ from estimator.readers.raw_files import RawTouches
 from estimator.readers.raw_sensors import DepthPad, raw_sensor
 from estimator.records import estimate_record
 from estimator.surface import SurfaceOfRevolution
+from estimator.vectors import Array
+from planner.carrying import Stop
 from planner.choosing.risk import risks_in_words
 from planner.explore import Step
 from planner.grasping.grasp_travel import GraspMotion
@@ -39,18 +42,10 @@ def print_round(console: Console, step: Step, number: int) -> None:
     plan = step.plan
     touches = "1 touch" if len(plan.probes) == 1 else f"{len(plan.probes)} touches"
     console.print(f"\n[bold]Round {number}[/]: {touches} in one placement")
-    table = Table(box=SIMPLE_HEAD, pad_edge=False)
-    for heading in ("finger", "meridian", "height", "reach residual", "felt"):
-        table.add_column(heading, justify="left" if heading == "finger" else "right")
-    for j, (probe, outcome) in enumerate(zip(plan.probes, step.outcomes, strict=True)):
-        table.add_row(
-            probe.finger,
-            f"{np.rad2deg(probe.place.theta) % 360:.0f} deg",
-            f"{1e3 * probe.place.z:+.0f} mm",
-            f"{1e6 * plan.reach.certificate.position_residuals[j]:.1f} um",
-            "nothing" if isinstance(outcome, Miss) else _felt(probe, outcome),
-        )
-    console.print(table)
+    if step.stop is not None:
+        console.print(f"  [bold yellow]Stopped[/] {stop_in_words(step.stop)}")
+    else:
+        console.print(_touched(step))
     if np.isfinite(plan.margin):
         console.print(
             f"  worst case of the best pair {np.rad2deg(plan.bound.angle):.1f} deg, margin "
@@ -75,6 +70,29 @@ def print_round(console: Console, step: Step, number: int) -> None:
         if estimate.verdict != "determined":
             for reason in estimate.reasons:
                 console.print(f"    {reason}")
+
+
+def _touched(step: Step) -> Table:
+    table = Table(box=SIMPLE_HEAD, pad_edge=False)
+    for heading in ("finger", "meridian", "height", "reach residual", "felt"):
+        table.add_column(heading, justify="left" if heading == "finger" else "right")
+    for j, (probe, outcome) in enumerate(zip(step.probes, step.outcomes, strict=True)):
+        table.add_row(
+            probe.finger,
+            f"{np.rad2deg(probe.place.theta) % 360:.0f} deg",
+            f"{1e3 * probe.place.z:+.0f} mm",
+            f"{1e6 * step.plan.reach.certificate.position_residuals[j]:.1f} um",
+            "nothing" if isinstance(outcome, Miss) else _felt(probe, outcome),
+        )
+    return table
+
+
+def stop_in_words(stop: Stop) -> str:
+    """What met the object on a motion that should not have."""
+    way = "on the way in" if stop.trajectory.phase == "enter" else "on the way to the object"
+    what = f"{stop.finger} felt the object" if stop.finger else "a link met the object"
+    told = "; that is a touch, too" if isinstance(stop.felt, Contact) else ""
+    return f"{way}, after {stop.time:.1f} of {stop.trajectory.duration:.1f} s: {what}{told}"
 
 
 def motion_in_words(motion: RoundMotion | GraspMotion) -> str:
@@ -118,17 +136,17 @@ def episode_of(
     """Each touch with the belief just before and just after it, and the grip at the end."""
     acts: list[Act] = []
     for step in steps:
-        belief, records = step.before, world.records[len(acts) :][: len(step.outcomes)]
+        belief, records = step.before, world.records[len(acts) :][: len(step.felt)]
         paced = [None] * len(records) if motions is None else motions(step, records)
-        for probe, outcome, record, motion in zip(
-            step.plan.probes, step.outcomes, records, paced, strict=True
+        for (finger, outcome), (path, bases), record, motion in zip(
+            step.felt, _ways(step), records, paced, strict=True
         ):
             after = update(belief, [outcome])
             acts.append(
                 Act(
-                    finger=probe.finger,
-                    path=probe.approach.path,
-                    bases=probe.approach.bases,
+                    finger=finger or "a link",
+                    path=path,
+                    bases=bases,
                     stop=record.stop,
                     outcome=outcome,
                     before=BelievedAxis(belief.axis, belief.covariance),
@@ -140,6 +158,13 @@ def episode_of(
             )
             belief = after
     return Episode(surface, tuple(acts), conclusion=conclusion, grip=grip)
+
+
+def _ways(step: Step) -> list[tuple[Array, tuple[pin.SE3, ...]]]:
+    """Joints and bases on the way to each thing that was felt."""
+    if step.stop is not None:
+        return [(step.stop.trajectory.q, step.stop.trajectory.bases)]
+    return [(probe.approach.path, probe.approach.bases) for probe in step.probes]
 
 
 def belief_record(belief: Belief, steps: list[Step]) -> dict[str, Any]:
@@ -155,21 +180,21 @@ def belief_record(belief: Belief, steps: list[Step]) -> dict[str, Any]:
 
 def raw_touches(sensor: str, steps: list[Step], world: World | MujocoWorld) -> RawTouches | None:
     """The raw signals of all touches that met the object; None where the sensor has none."""
-    probes = [probe for step in steps for probe in step.plan.probes]
+    fingers = [finger for step in steps for finger, _ in step.felt]
     felt = [
-        (probe.finger, record.felt)
-        for probe, record in zip(probes, world.records, strict=True)
+        (finger, record.felt)
+        for finger, record in zip(fingers, world.records, strict=True)
         if record.felt is not None and record.felt.signal is not None
     ]
     if not felt:
         return None
     signals = np.array([one.signal for _, one in felt])
     poses = np.array([one.X_WS for _, one in felt])
-    fingers = tuple(finger for finger, _ in felt)
+    names = tuple(finger for finger, _ in felt)
     kind = raw_sensor_of(world, sensor).kind
     if isinstance(kind, DepthPad):
         return RawTouches(
             poses, depth=signals, pixel_pitch=kind.pixel_pitch, pad_radius=kind.radius,
-            finger=fingers, sensor=sensor,
+            finger=names, sensor=sensor,
         )  # fmt: skip
-    return RawTouches(poses, strains=signals, finger=fingers, sensor=sensor)
+    return RawTouches(poses, strains=signals, finger=names, sensor=sensor)

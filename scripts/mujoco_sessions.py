@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from worlds import build_world, pose_in
+from grasp_moves import from_home
+from worlds import build_world, mover, pose_in
 
 from estimator.axis import angle_between, offset_at
 from estimator.band import ProfileBand
@@ -20,6 +21,7 @@ from hand_models import load_hand
 from hand_models.hand import Hand
 from planner.explore import Step, explore
 from planner.goal import Goal
+from planner.options import PlannerOptions
 from planner.plan import NoPlan, Plan, Probe, plan_probes
 from sim_sensor.camera import coarse_view
 from sim_sensor.objects import load_object
@@ -58,6 +60,8 @@ class Session:
         why: What is missing where the goal is not met.
         surprises: Rounds that contradicted earlier ones.
         bumped: Touches on whose way something else met the object.
+        stops: Motions between touches that the object ended.
+        motions: Of those, ended or not.
         moved: Of the object, all touches together [mm].
     """
 
@@ -73,6 +77,8 @@ class Session:
     bumped: int
     moved: float
     unpressed: int
+    stops: int
+    motions: int
 
 
 def exact_belief(surface: SurfaceOfRevolution) -> Belief:
@@ -141,7 +147,8 @@ def _steps(hand: str, world: World | MujocoWorld, belief: Belief, seed: int) -> 
 
     return explore(
         _hand(hand), touch, belief, sensor_noise(SENSOR), goal=GOAL, budget=BUDGET,
-        rng=np.random.default_rng([seed, 1]),
+        rng=np.random.default_rng([seed, 1]), move=mover(world, SENSOR),
+        options=from_home(_hand(hand), PlannerOptions(certify=False)),
     )  # fmt: skip
 
 
@@ -173,6 +180,8 @@ def _told(
         bumped=sum(bool(r.bumped) for r in records),
         moved=1e3 * sum(r.moved for r in records),
         unpressed=sum(r.met is not None and not r.reached for r in records),
+        stops=sum(step.stop is not None for step in steps),
+        motions=0 if isinstance(world, World) else len(world.followed),
     )
 
 

@@ -117,7 +117,7 @@ def _report(
     )
     table = Table(title="Sessions with the default goal", box=None, pad_edge=False)
     for heading in ("world", "object", "runs", "goal met", "touches", "angle deg", "offset mm",
-                    "surprises", "bumped", "moved mm"):  # fmt: skip
+                    "surprises", "stops", "moved mm"):  # fmt: skip
         table.add_column(heading, justify="left" if heading in ("world", "object") else "right")
     for world in worlds:
         here = [s for s in sessions if s["world"] == world]
@@ -137,7 +137,7 @@ def _row(table: Table, world: str, name: str, here: list[dict[str, Any]]) -> Non
         f"{np.mean([s['touches'] for s in here]):.1f}",
         f"{np.median(angle):.2f}, 90 % {np.quantile(angle, 0.9):.2f}",
         f"{np.median(offset):.2f}, 90 % {np.quantile(offset, 0.9):.2f}",
-        *(str(sum(s[key] for s in here)) for key in ("surprises", "bumped")),
+        *(str(sum(s[key] for s in here)) for key in ("surprises", "stops")),
         f"{np.median([s['moved'] for s in here]):.1f}",
     )  # fmt: skip
 

@@ -30,13 +30,13 @@ import tyro
 from describe_hand import Options as DescribeOptions
 from describe_hand import describe
 from grasp_ending import Ending, ending, ending_record, grip_of, print_ending
-from grasp_moves import act_motions, from_home, left_at
+from grasp_moves import act_motions, from_home
 from grasp_report import belief_record, episode_of, print_round, raw_touches
 from output_files import require_writable, write_json
 from plan_options import Options, grasp_options, planner_options, require_sane
 from rich.console import Console
 from views import belief_by
-from worlds import build_world, pose_in, print_object, sensor_in
+from worlds import build_world, mover, pose_in, print_object, sensor_in
 
 from estimator.axis import angle_between, offset_at
 from estimator.belief import Belief
@@ -150,6 +150,7 @@ def _rounds(scenario: Scenario, options: Options, console: Console) -> Iterator[
         budget=options.budget,
         options=scenario.planner,
         rng=np.random.default_rng([options.seed, 1]),
+        move=mover(scenario.world, options.sensor),
     )
     while True:
         with console.status(f"planning and touching {FIRST_TIME} ..."):
@@ -175,7 +176,9 @@ def _conclude(
     rng, end = np.random.default_rng([options.seed, 2]), Ending()
     if met:
         with console.status("planning the grasp ..."):
-            grasp = replace(scenario.grasp, start=left_at(steps, scenario.planner.start))
+            grasp = replace(
+                scenario.grasp, start=steps[-1].left if steps else scenario.planner.start
+            )
             end = ending(scenario.hand, belief, scenario.world.surface, grasp, rng=rng)
         print_ending(console, end)
     truth = scenario.world.surface.axis

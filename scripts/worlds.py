@@ -9,6 +9,7 @@ MuJoCo is installed with the extra `mujoco`; nothing here imports it unless it i
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,9 +17,12 @@ import numpy as np
 from rich.console import Console
 
 from estimator.axis import Axis
+from estimator.contact import Contact
 from estimator.readers.raw_sensors import RAW_SENSORS, RawSensor, raw_sensor
 from estimator.surface import SurfaceOfRevolution
 from hand_models.hand import Hand
+from planner.carrying import Move, Stop
+from planner.motions.trajectory import Trajectory
 from sim_sensor.mesh_objects import SUFFIXES, read_mesh
 from sim_sensor.noise import simulated_sensor
 from sim_sensor.signals.raw_sense import raw_sense
@@ -71,6 +75,23 @@ def build_world(
         raise ValueError(f"--world {world}: needs the extra 'mujoco' ({error})") from None
     standing = Standing() if world == "mujoco-table" else None
     return MujocoWorld(hand, surface, rng=rng, standing=standing)
+
+
+def mover(world: World | MujocoWorld, sensor: str) -> Move | None:
+    """Who carries motions between touches out: MuJoCo. Our own world knows no hand."""
+    if isinstance(world, World):
+        return None
+
+    def move(trajectory: Trajectory) -> Stop | None:
+        told = world.follow(trajectory)
+        if not told.ended:
+            return None
+        felt = world.records[-1].outcome
+        if isinstance(felt, Contact):
+            felt = replace(felt, finger=told.finger, sensor=sensor)
+        return Stop(trajectory, told.time, told.finger, felt)
+
+    return move
 
 
 def print_object(console: Console, name: str) -> None:

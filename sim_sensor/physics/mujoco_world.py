@@ -5,8 +5,9 @@ carries out the planned approach with position actuators, stops when its pad is 
 approach's force, reads the pad's image and goes back the way it came. Only the reader is ours.
 
 Conventions
-    The base is where the plan puts it: the arm is ideal. Between touches the hand is set to the
-    start of the next approach; the object stays where the last touch left it.
+    The base is where the plan puts it: the arm is ideal. Motions between touches are carried out
+    (`follow`), or else the hand is set to the start of the next approach; the object stays where
+    the last touch left it.
     A start that already presses the object is taken back along the approach's first step, the
     base with it, and the hand comes from there: `overlap` says how far.
     A pad that reaches the end of its path unpressed reports a miss where it really is.
@@ -25,6 +26,7 @@ from estimator.readers.raw_sensors import RawSensor, raw_sensor, with_depth
 from estimator.surface import Geometry, SurfaceOfRevolution
 from estimator.vectors import Array, frozen
 from hand_models.hand import Hand
+from sim_sensor.physics.mujoco_follow import Followed, Timed, follow
 from sim_sensor.physics.mujoco_hand import pad_name, place_base
 from sim_sensor.physics.mujoco_models import OBJECT, Models, Standing, build_models
 from sim_sensor.physics.mujoco_object import place_object
@@ -90,6 +92,7 @@ class MujocoWorld:
         self._pads = {f.name: _mounted(f.pad_radius, noisy, rng) for f in hand.fingers}
         self._noisy, self._solid = noisy, Solid(surface.profile)
         self._records: list[MujocoRecord] = []
+        self._followed: list[Followed] = []
         mujoco.mj_forward(self._models.moving, self._data)
 
     @property
@@ -115,10 +118,27 @@ class MujocoWorld:
         """
         before = self._data.body(OBJECT).xpos.copy()
         pressed = press(self._models.moving, self._data, self._hand, path)
-        record = self._record(path, pressed, finger_axis_W)
+        record = self._record(path.finger, pressed, finger_axis_W)
         moved = float(np.linalg.norm(self._data.body(OBJECT).xpos - before))
         self._records.append(replace(record, moved=moved))
         return record.outcome
+
+    def follow(self, way: Timed) -> Followed:
+        """Carry a motion between touches out; what ends it is one more record."""
+        before = self._data.body(OBJECT).xpos.copy()
+        told = follow(self._models.moving, self._data, self._hand, way)
+        self._followed.append(told)
+        if told.press is not None:
+            finger = told.finger or self._hand.fingers[0].name
+            record = self._record(finger, told.press, None)
+            moved = float(np.linalg.norm(self._data.body(OBJECT).xpos - before))
+            self._records.append(replace(record, moved=moved))
+        return told
+
+    @property
+    def followed(self) -> tuple[Followed, ...]:
+        """How motions between touches went, in order."""
+        return tuple(self._followed)
 
     def push(self, force_W: Array, *, seconds: float) -> None:
         """Somebody bumps the object: a force [N] on its middle for a time; then it comes to rest.
@@ -134,10 +154,9 @@ class MujocoWorld:
             body.xfrc_applied[:3] = force_W if k * model.opt.timestep < seconds else 0.0
             mujoco.mj_step(model, data)
 
-    def _record(self, path: Touching, pressed: Press, axis: Array | None) -> MujocoRecord:
-        finger = self._hand.finger(path.finger)
+    def _record(self, finger: str, pressed: Press, axis: Array | None) -> MujocoRecord:
         told = MujocoRecord(
-            Miss(pressed.tip, finger.pad_radius), pressed.tip, pressed.stop,
+            Miss(pressed.tip, self._hand.finger(finger).pad_radius), pressed.tip, pressed.stop,
             overlap=pressed.overlap, met=pressed.met, force=pressed.force,
             bumped=pressed.bumped, reached=pressed.reached,
         )  # fmt: skip
@@ -154,7 +173,7 @@ class MujocoWorld:
             truth=_geometry(surface, pressed.rests),
             part=self._solid.nearest(float(rho), float(z), float(theta)).part,
         )
-        return self._feel(told, path.finger, np.zeros(3) if axis is None else axis)
+        return self._feel(told, finger, np.zeros(3) if axis is None else axis)
 
     def _surface_in(self, data: mujoco.MjData) -> SurfaceOfRevolution:
         body = data.body(OBJECT)
