@@ -1,0 +1,118 @@
+"""MuJoCo carries planned motions out in their own time, and what is in the way ends them."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("mujoco", minversion="3.9")
+
+from grasp_moves import from_home
+from worlds import mover
+
+from estimator.axis import Axis, angle_between
+from estimator.contact import Contact, Miss
+from estimator.sensors import sensor_noise
+from estimator.surface import SurfaceOfRevolution
+from estimator.vectors import Array
+from hand_models import load_hand
+from planner.explore import explore
+from planner.goal import Goal
+from planner.options import PlannerOptions
+from planner.plan import Plan, plan_probes
+from sim_sensor.camera import coarse_view
+from sim_sensor.objects import load_object
+from sim_sensor.physics.mujoco_world import MujocoWorld
+
+HAND = load_hand("allegro_right")
+GOAL = Goal(np.deg2rad(3.0), 2e-3)
+OPTIONS = from_home(HAND, PlannerOptions(placements=400, certify=False))
+SURFACE = SurfaceOfRevolution(Axis([0.5, 0.0, 0.2], [0.1, -0.1, 1.0]), load_object("can"))
+
+
+BELIEF = coarse_view(SURFACE, angle=np.deg2rad(15.0), offset=0.015, rng=np.random.default_rng(0))
+
+
+@functools.cache
+def planned() -> Plan:
+    return plan_probes(
+        HAND, BELIEF, sensor_noise("gel-depth"), goal=GOAL,
+        rng=np.random.default_rng(0), options=OPTIONS,
+    )  # fmt: skip
+
+
+def world_where_believed(*, shift: Array | None = None) -> MujocoWorld:
+    """The can where it is believed, or beside that."""
+    axis = BELIEF.axis
+    there = Axis(axis.point + (np.zeros(3) if shift is None else shift), axis.direction)
+    return MujocoWorld(HAND, replace(SURFACE, axis=there), rng=np.random.default_rng(0))
+
+
+def test_a_motion_through_free_space_ends_where_it_was_planned_to() -> None:
+    """Truth: Pinocchio's pads at the trajectory's end."""
+    world, motion = world_where_believed(), planned().motion
+    for way in (motion.transfer, motion.enter):
+        told = world.follow(way)
+        assert not told.ended
+        assert told.time == pytest.approx(way.duration)
+        assert told.lag < 0.1
+        assert told.bumped == ()
+    pose = HAND.at(motion.enter.end.q, motion.enter.end.X_WB)
+    for finger, centre in zip(HAND.fingers, pose.pad_centres, strict=True):
+        assert np.linalg.norm(world._data.geom(f"pad/{finger.name}").xpos - centre) < 2e-3
+    assert world.records == ()
+
+
+def test_an_object_on_the_way_in_ends_it_and_is_felt_where_it_is() -> None:
+    """The object 40 mm towards the hand: the truth is its wall."""
+    enter = planned().motion.enter
+    way = enter.end.X_WB.translation - enter.begin.X_WB.translation
+    towards = -0.04 * way / np.linalg.norm(way)
+    world = world_where_believed(shift=towards)
+    told = world.follow(enter)
+    assert told.ended
+    assert 0.0 < told.time < enter.duration
+    record = world.records[-1]
+    if told.finger:
+        assert isinstance(record.outcome, Contact)
+        off = world.surface.signed_distance(record.outcome.position)
+        assert abs(off) < 1.5e-3
+        assert record.force < 3.0
+    else:
+        assert isinstance(record.outcome, Miss)
+        assert told.bumped
+    begin = HAND.at(enter.begin.q, enter.begin.X_WB)
+    for finger, centre in zip(HAND.fingers, begin.pad_centres, strict=True):
+        assert np.linalg.norm(world._data.geom(f"pad/{finger.name}").xpos - centre) < 5e-3
+
+
+def test_the_way_out_is_gone_to_its_end_whatever_it_meets() -> None:
+    leave = planned().motion.leave
+    world = world_where_believed()
+    told = world.follow(leave)
+    assert not told.ended
+    assert told.time == pytest.approx(leave.duration)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_sessions_in_which_every_motion_is_carried_out_meet_their_goal(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    world = MujocoWorld(HAND, SURFACE, rng=rng)
+    belief = coarse_view(SURFACE, angle=np.deg2rad(15.0), offset=0.015, rng=rng)
+
+    def touch(probe):
+        felt = world.touch(probe.approach, finger_axis_W=probe.approach.finger_axis)
+        return felt if isinstance(felt, Miss) else replace(felt, finger=probe.finger)
+
+    steps = list(explore(
+        HAND, touch, belief, sensor_noise("gel-depth"), goal=GOAL, budget=15,
+        rng=np.random.default_rng(seed), options=OPTIONS, move=mover(world, "gel-depth"),
+    ))  # fmt: skip
+    assert GOAL.met_by(steps[-1].after)
+    assert angle_between(steps[-1].after.axis, SURFACE.axis) < np.deg2rad(4.0)
+    assert len(world.followed) >= 2 * len(steps)
+    assert len(world.records) == steps[-1].touches
+    assert max(told.lag for told in world.followed) < 0.2
