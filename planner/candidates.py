@@ -10,14 +10,13 @@ joint angles and the base pose that nearly make them; `reach` makes them exact.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from estimator.surface import SurfaceOfRevolution
 from estimator.vectors import Array, Index, Mask, unit
-from hand_models.hand import Hand
-from hand_models.spheres import LinkSpheres
 from planner.reaching.clear import clear_of
 from planner.reaching.laying import Laid, lay
 from planner.reaching.reach_map import ReachMap
@@ -114,20 +113,31 @@ def _kept(
         ("pad turned away", np.all(laid.pad_angle < reach_map.cone, axis=1)),
         ("beyond the ends", np.all((laid.z > low + margin) & (laid.z < high - margin), axis=1)),
     )
-    fingers, laid = fingers[alive], laid.take(alive)
-    spheres = reach_map.spheres
-    free = clear_of(reach_map.hand, spheres, surface.profile, laid.q, laid.R_OB, laid.p_OB)
-    R_WB, p_WB, theta, within, clear = _turned_best(reach_map, surface, laid, workspace, room)
+    told = (("placements fitted", len(laid.q)), *told)
+    fingers, laid, hand = fingers[alive], laid.take(alive), reach_map.hand
+    free = clear_of(hand, reach_map.spheres, surface.profile, laid.q, laid.R_OB, laid.p_OB)
+    fingers, laid = fingers[free], laid.take(np.flatnonzero(free))
+    best = _turned_best(reach_map, surface, laid, workspace, room)
     alive, more = _passed(
         len(laid.q),
-        ("links inside the object", free),
-        ("base outside its workspace", within),
-        ("in the table or a box, turned whichever way", clear),
+        ("base outside its workspace", best.within),
+        ("in the table or a box, turned whichever way", best.clear),
     )
-    rejected = (("placements fitted", len(free) + sum(n for _, n in told)), *told, *more)
+    rejected = (*told, ("links inside the object", int(np.sum(~free))), *more)
     return Candidates(
-        fingers, laid.q, R_WB, p_WB, theta, laid.z, laid.pad_angle, rejected
+        fingers, laid.q, best.R_WB, best.p_WB, best.theta, laid.z, laid.pad_angle, rejected
     ).take(alive)  # fmt: skip
+
+
+class _Turned(NamedTuple):
+    """Poses of the base (N, 3, 3), (N, 3) and angles of the contacts (N, m) after a turn about the
+    object's axis; whether the base is then in its workspace, and clear of the room, (N,)."""
+
+    R_WB: Array
+    p_WB: Array
+    theta: Array
+    within: Mask
+    clear: Mask
 
 
 def _passed(count: int, *tests: tuple[str, Mask]) -> tuple[Index, tuple[tuple[str, int], ...]]:
@@ -141,12 +151,8 @@ def _passed(count: int, *tests: tuple[str, Mask]) -> tuple[Index, tuple[tuple[st
 
 def _turned_best(
     reach_map: ReachMap, surface: SurfaceOfRevolution, laid: Laid, workspace: Workspace, room: Room
-) -> tuple[Array, Array, Array, Mask, Mask]:
-    """Poses of the base (N, 3, 3), (N, 3) and angles of the contacts (N, m) after the best turn
-    about the object's axis; whether the base is then in its workspace and clear of the room, (N,).
-
-    As it was laid, if that will do and nothing draws it elsewhere.
-    """
+) -> _Turned:
+    """Each after the turn that suits workspace and room best; as it was laid, if that will do."""
     free = workspace.X_WB is None
     angles = evenly(TURNS if not free else 1 if room.is_empty else IN_ROOM)
     R, p = turned(surface, laid.R_OB, laid.p_OB, angles)
@@ -155,24 +161,9 @@ def _turned_best(
     cost = workspace.distance(R, p) + 1e3 * ~within + 1e2 * ~clear
     best, rows = np.argmin(cost, axis=0), np.arange(len(laid.q))
     theta = np.angle(np.exp(1j * (laid.theta + angles[best, None])))
-    return (
-        R[best, rows], p[best, rows], theta, within[best, rows],
-        clear[best, rows] | ~within[best, rows],
+    return _Turned(
+        R[best, rows], p[best, rows], theta, within[best, rows], clear[best, rows]
     )  # fmt: skip
-
-
-def clear_of_object(
-    hand: Hand,
-    spheres: LinkSpheres,
-    surface: SurfaceOfRevolution,
-    q: Array,
-    R_WB: Array,
-    p_WB: Array,
-) -> Mask:
-    """Whether links stay out of the believed object, coarsely (`clear_of`), (N,)."""
-    R_OB = surface.frame @ R_WB
-    p_OB = (p_WB - surface.axis.point) @ surface.frame.T
-    return clear_of(hand, spheres, surface.profile, q, R_OB, p_OB)
 
 
 def single_candidates(

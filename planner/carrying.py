@@ -1,7 +1,8 @@
 """Carry a plan out: its motions and probes in order, until a motion meets what it should not.
 
-An object that is not where it is believed may stand in the hand's way in. The motion is guarded
-and ends there; what the finger felt is a touch like any other, and the plan is not gone on with.
+An object that is not where it is believed may stand in the hand's way. The motion ends there, the
+hand goes back to where the motion began, and the plan is not gone on with. What a finger felt is a
+touch like any other; where a link met the object, nothing was felt.
 """
 
 from __future__ import annotations
@@ -22,14 +23,14 @@ class Stop:
     Args:
         trajectory: The motion.
         time: When it ended [s].
-        finger: That met something; empty for a link that is none's pad.
-        felt: By the finger; a miss where nothing could be felt.
+        finger: That met something; empty for a link, which feels nothing.
+        felt: By the finger; None where nothing was.
     """
 
     trajectory: Trajectory
     time: float
     finger: str
-    felt: Contact | Miss
+    felt: Contact | None = None
 
 
 Touch = Callable[[Probe], Contact | Miss]
@@ -53,11 +54,12 @@ def carry_out(plan: Plan, touch: Touch, move: Move | None) -> Carried:
 
     Args:
         touch: Makes a probe: along its approach until the finger feels something, and back.
-        move: Makes a free motion; None where nobody does, or the plan has none.
+        move: Makes a motion between probes; None where nobody does. What it says of the way out
+            counts for nothing: that is gone to its end.
     """
-    motion = plan.motion if move is not None else None
-    if motion is None or move is None:
+    if move is None or plan.motion is None:
         return Carried(tuple(touch(probe) for probe in plan.probes))
+    motion = plan.motion
     for way in (motion.transfer, motion.enter):
         stop = None if way is None else move(way)
         if stop is not None:

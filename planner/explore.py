@@ -30,6 +30,7 @@ from planner.plan import NoPlan, Plan, Probe, plan_probes
 from planner.surprise import Learnt, learn
 
 UNLIKELY = 0.5  # chance of a miss from which a placement is not worth its three touches
+CLEARER, CLEAREST = 3e-3, 7e-3  # added to links' clearance where one met the object, at most [m]
 TELLING_TRIES = 6  # best single touches that are handed to the optimiser
 
 
@@ -41,9 +42,10 @@ class Step:
         plan: The probes.
         outcomes: A contact or a miss for each probe; none where a motion was stopped before.
         before, after: The belief.
-        touches: All that was felt or missed so far.
+        touches: Probes and stops so far.
         surprise: What the touches contradicted and what was done about it; None where nothing.
         stop: The motion that met something, and what was felt; None where all were carried out.
+        settled: Whether later touches have confirmed what surprises left.
     """
 
     plan: Plan
@@ -53,6 +55,7 @@ class Step:
     touches: int
     surprise: str | None = None
     stop: Stop | None = None
+    settled: bool = True
 
     @property
     def probes(self) -> tuple[Probe, ...]:
@@ -63,7 +66,8 @@ class Step:
     def felt(self) -> tuple[tuple[str, Contact | Miss], ...]:
         """Each finger that touched or missed, in order; what stopped the hand, too."""
         if self.stop is not None:
-            return ((self.stop.finger, self.stop.felt),)
+            felt = self.stop.felt
+            return () if felt is None else ((self.stop.finger, felt),)
         return tuple((p.finger, felt) for p, felt in zip(self.probes, self.outcomes, strict=True))
 
     @property
@@ -90,33 +94,46 @@ def explore(
 
     Args:
         touch: Carries a probe out, there and back: a simulated sensor, a physics engine or a robot.
-        budget: Largest number of probes, misses included.
+        budget: Largest number of probes and stops, misses included.
         move: Carries out what lies between probes, or says what stopped it; asked for what
             `options.start` lets the planner plan. None where somebody else moves the hand.
     Raises:
         NoPlan: The hand reaches nothing useful on the believed object.
-        ValueError: A budget below one.
+        ValueError: A budget below one, or an arm whose root stands in an obstacle.
     """
     if budget < 1:
         raise ValueError(f"budget: expected at least one touch, got {budget}")
     options = options or PlannerOptions()
-    learnt, touches = Learnt(belief), 0
+    learnt, touches, asked = Learnt(belief), 0, options.reach
     while touches < budget and not (goal.met_by(learnt.belief) and learnt.settled):
         before = learnt.belief
         try:
             plan = _plan(hand, learnt, sensor, goal, budget - touches, rng, options)
         except NoPlan:
+            if options.reach != asked:
+                options = replace(options, reach=asked)  # nothing is as clear as it was to be
+                continue
             if goal.met_by(before):
                 return  # nothing to confirm it with is within reach
             raise
         outcomes, stop = carry_out(plan, touch, move)
-        felt = outcomes if stop is None else (stop.felt,)
-        touches += len(felt)
-        learnt = learn(learnt, felt)
-        step = Step(plan, outcomes, before, learnt.belief, touches, learnt.surprise, stop)
+        felt = outcomes if stop is None or stop.felt is None else (stop.felt,)
+        touches += len(outcomes) if stop is None else 1
+        learnt = learn(learnt, felt) if felt else learnt
+        step = Step(
+            plan, outcomes, before, learnt.belief, touches, learnt.surprise, stop, learnt.settled
+        )
         if plan.motion is not None:
             options = replace(options, start=step.left)
+        if stop is not None and stop.felt is None:
+            options = _warier(options)
         yield step
+
+
+def _warier(options: PlannerOptions) -> PlannerOptions:
+    """Links farther from the object than before: one has met it."""
+    clearance = min(options.reach.clearance + CLEARER, max(CLEAREST, options.reach.clearance))
+    return replace(options, reach=replace(options.reach, clearance=clearance))
 
 
 def _plan(

@@ -7,28 +7,30 @@ from collections import Counter
 
 Funnel = tuple[tuple[str, int], ...]
 
-MOST = 4  # reasons that are told of each number of fingers
-_AMOUNT = re.compile(r"\d+(\.\d+)?(?= (mm|deg)\b)")
+MOST = 5  # counts that are told of each number of fingers, how many there were among them
+_AMOUNT = re.compile(r"( by)? \d+(\.\d+)? (mm|deg)\b")
 
 
 def in_words(funnel: Funnel) -> str:
-    """What refused most candidates, for each number of fingers, and how many other reasons.
+    """How many candidates there were, what refused most of them, and how many other reasons.
 
-    Reasons that differ by an amount only are one.
+    For each number of fingers; reasons that differ by an amount only are one.
     """
     groups: dict[str, Counter[str]] = {}
     for words, count in funnel:
-        head, _, reason = words.rpartition("fingers: ")
-        groups.setdefault(head, Counter())[_AMOUNT.sub("some", reason)] += count
+        head, told, reason = words.partition(" fingers: ")
+        number, reason = (head, reason) if told else ("", words)
+        if count:
+            groups.setdefault(number, Counter())[_AMOUNT.sub("", reason)] += count
     return "; ".join(
-        (f"with {head.strip()} fingers, " if head else "") + _most(group)
-        for head, group in groups.items()
+        (f"with {number} fingers, " if number else "") + _most(group)
+        for number, group in groups.items()
     )
 
 
 def _most(group: Counter[str]) -> str:
-    told = [f"{reason} {count}" for reason, count in group.most_common(1 + MOST) if count]
-    rest = [count for _, count in group.most_common()[len(told) :] if count]
+    told = [f"{reason} {count}" for reason, count in group.most_common(MOST)]
+    rest = [count for _, count in group.most_common()[MOST:]]
     if rest:
         told.append(f"{sum(rest)} for {len(rest)} other reasons")
     return ", ".join(told)

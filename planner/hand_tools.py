@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-import pinocchio as pin
 
 from estimator.belief import Belief
 from estimator.surface import SurfaceOfRevolution
@@ -19,7 +18,7 @@ from hand_models.spheres import LinkSpheres, link_spheres
 from planner.candidates import Candidates, placement_candidates, single_candidates
 from planner.motions.retreat import Retreat, ways_out
 from planner.motions.surroundings import fixed_bodies, object_body
-from planner.reaching.arm_reach import ArmReach, Standing
+from planner.reaching.arm_reach import ArmReach, InTheWay
 from planner.reaching.clear import INTRUSION
 from planner.reaching.reach import Reach, ReachSolver
 from planner.reaching.reach_map import ReachMap
@@ -78,15 +77,16 @@ class HandTools:
             )  # fmt: skip
         if self.arm is None:
             return laid
-        return self.arm.placements(laid, surface, room, self._standing(surface))
+        return self.arm.placements(laid, surface, room, self._in_the_way(surface))
 
-    def _standing(self, surface: SurfaceOfRevolution) -> Standing:
+    def _in_the_way(self, surface: SurfaceOfRevolution) -> InTheWay:
         """Says what hand and arm meet in a posture; the object coarsely, as reach goes on."""
-        root = self.rules.workspace.X_WB or pin.SE3.Identity()
+        root = self.rules.workspace.X_WB
+        assert root is not None  # of an arm
         bodies = [(body, 0.0) for body in fixed_bodies(self.rules.table, self.rules.boxes)]
         bodies.append((object_body(believed_solid(surface)), -INTRUSION))
 
-        def in_the_way(q: Array) -> str | None:
+        def met_by(q: Array) -> str | None:
             if not self.collision.is_self_free(q):
                 return "the arm folded into itself or the hand"
             for body, least in bodies:
@@ -95,7 +95,7 @@ class HandTools:
                     return f"{pair.first} in {body.name}"
             return None
 
-        return in_the_way
+        return met_by
 
     def ways_out(self, belief: Belief, reach: Reach) -> tuple[Retreat, ...]:
         """Of the whole, from a reach's stand-off; a free hand's base is the reach's there."""

@@ -154,6 +154,7 @@ def step_record(step: Step) -> dict[str, Any]:
         ],
         "stopped": None if step.stop is None else stop_record(step.stop),
         "surprise": step.surprise,
+        "settled": step.settled,
         "expected_error": {"angle": step.plan.angle, "offset": step.plan.offset},
         "axis": axis_record(step.after.hypotheses[0]),
         "estimate": estimate_record(estimate) if estimate is not None else None,
@@ -161,11 +162,12 @@ def step_record(step: Step) -> dict[str, Any]:
 
 
 def stop_record(stop: Stop) -> dict[str, Any]:
-    """A motion that met something, and what was felt then."""
+    """A motion that met something, and the contact that a finger felt, which counts as a touch."""
     return {
         "phase": stop.trajectory.phase,
         "time": stop.time,
-        **outcome_record(stop.finger, stop.felt),
+        "finger": stop.finger or None,
+        "contact": None if stop.felt is None else contact_record(stop.felt),
     }
 
 

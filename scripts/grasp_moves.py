@@ -35,15 +35,22 @@ def from_home(hand: Hand, options: PlannerOptions) -> PlannerOptions:
     return replace(options, start=Configuration(hand.home, X_WB))
 
 
+def unconfirmed_by(steps: Sequence[Step]) -> str | None:
+    """The last surprise, if nothing has confirmed what is believed since."""
+    if not steps or steps[-1].settled:
+        return None
+    return next((step.surprise for step in reversed(steps) if step.surprise is not None), None)
+
+
 def act_motions(
     hand: Hand, limits: MotionLimits, step: Step, records: Sequence[TouchRecord]
 ) -> list[ActMotion | None]:
     """One placement as it went: each finger up to where it stopped, and back from there."""
-    if step.stop is not None:
-        return [_stopped(step.plan.motion, step.stop)]
     motion = step.plan.motion
     if motion is None:
-        return [None] * len(step.plan.probes)
+        return [None] * len(records)
+    if step.stop is not None:
+        return [_stopped(motion, step.stop) for _ in records]
     acts: list[ActMotion | None] = []
     pairs = zip(step.plan.probes, motion.probes, records, strict=True)
     for j, (probe, (forward, _), record) in enumerate(pairs):
@@ -58,12 +65,11 @@ def act_motions(
     return acts
 
 
-def _stopped(motion: RoundMotion | None, stop: Stop) -> ActMotion | None:
+def _stopped(motion: RoundMotion, stop: Stop) -> ActMotion:
     """Up to where something ended the motion, and back."""
     met = stop.trajectory.until(stop.time)
     way = move([met])
-    if way is None or motion is None:
-        return None
+    assert way is not None
     come = [motion.transfer] if stop.trajectory.phase == "enter" else []
     return ActMotion(move(come), way, move([met.reversed("withdraw")]))
 

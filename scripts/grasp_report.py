@@ -25,7 +25,7 @@ from planner.explore import Step
 from planner.grasping.grasp_travel import GraspMotion
 from planner.messages import step_record
 from planner.motions.round_motion import RoundMotion
-from planner.plan import Probe
+from planner.plan import Plan, Probe
 from sim_sensor.feeling import Felt
 from sim_sensor.viewer.episode import Act, BelievedAxis, Episode, Grip
 from sim_sensor.viewer.moves import ActMotion
@@ -41,11 +41,20 @@ if TYPE_CHECKING:
 def print_round(console: Console, step: Step, number: int) -> None:
     plan = step.plan
     touches = "1 touch" if len(plan.probes) == 1 else f"{len(plan.probes)} touches"
-    console.print(f"\n[bold]Round {number}[/]: {touches} in one placement")
     if step.stop is not None:
+        console.print(f"\n[bold]Round {number}[/]: {touches} planned in one placement")
         console.print(f"  [bold yellow]Stopped[/] {stop_in_words(step.stop)}")
     else:
+        console.print(f"\n[bold]Round {number}[/]: {touches} in one placement")
         console.print(_touched(step))
+        _print_plan(console, plan)
+    if step.surprise is not None:
+        console.print(f"  [bold yellow]Surprise[/]: {step.surprise}")
+    _print_estimate(console, step)
+
+
+def _print_plan(console: Console, plan: Plan) -> None:
+    """What was expected of it."""
     if np.isfinite(plan.margin):
         console.print(
             f"  worst case of the best pair {np.rad2deg(plan.bound.angle):.1f} deg, margin "
@@ -57,19 +66,21 @@ def print_round(console: Console, step: Step, number: int) -> None:
         console.print(f"  {risks_in_words(plan.risks)}")
     if plan.motion is not None:
         console.print(f"  {motion_in_words(plan.motion)}")
-    if step.surprise is not None:
-        console.print(f"  [bold yellow]Surprise[/]: {step.surprise}")
-    estimate = step.after.estimate
-    if estimate is not None:
-        console.print(
-            f"  [bold]{estimate.verdict}[/]: direction within "
-            f"{np.rad2deg(estimate.angle_95):.1f} deg, position within "
-            f"{1e3 * estimate.offset_95:.1f} mm (95 %); expected before "
-            f"{np.rad2deg(plan.angle):.1f} deg, {1e3 * plan.offset:.1f} mm"
-        )
-        if estimate.verdict != "determined":
-            for reason in estimate.reasons:
-                console.print(f"    {reason}")
+
+
+def _print_estimate(console: Console, step: Step) -> None:
+    estimate, plan = step.after.estimate, step.plan
+    if estimate is None:
+        return
+    expected = f"; expected before {np.rad2deg(plan.angle):.1f} deg, {1e3 * plan.offset:.1f} mm"
+    console.print(
+        f"  [bold]{estimate.verdict}[/]: direction within "
+        f"{np.rad2deg(estimate.angle_95):.1f} deg, position within "
+        f"{1e3 * estimate.offset_95:.1f} mm (95 %){expected if step.stop is None else ''}"
+    )
+    if estimate.verdict != "determined":
+        for reason in estimate.reasons:
+            console.print(f"    {reason}")
 
 
 def _touched(step: Step) -> Table:
@@ -91,7 +102,7 @@ def stop_in_words(stop: Stop) -> str:
     """What met the object on a motion that should not have."""
     way = "on the way in" if stop.trajectory.phase == "enter" else "on the way to the object"
     what = f"{stop.finger} felt the object" if stop.finger else "a link met the object"
-    told = "; that is a touch, too" if isinstance(stop.felt, Contact) else ""
+    told = "; that is a touch, too" if stop.felt is not None else ", which feels nothing"
     return f"{way}, after {stop.time:.1f} of {stop.trajectory.duration:.1f} s: {what}{told}"
 
 
@@ -144,7 +155,7 @@ def episode_of(
             after = update(belief, [outcome])
             acts.append(
                 Act(
-                    finger=finger or "a link",
+                    finger=finger,
                     path=path,
                     bases=bases,
                     stop=record.stop,
@@ -163,7 +174,7 @@ def episode_of(
 def _ways(step: Step) -> list[tuple[Array, tuple[pin.SE3, ...]]]:
     """Joints and bases on the way to each thing that was felt."""
     if step.stop is not None:
-        return [(step.stop.trajectory.q, step.stop.trajectory.bases)]
+        return [(step.stop.trajectory.q, step.stop.trajectory.bases) for _ in step.felt]
     return [(probe.approach.path, probe.approach.bases) for probe in step.probes]
 
 

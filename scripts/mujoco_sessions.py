@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from grasp_moves import from_home
+from grasp_moves import from_home, unconfirmed_by
 from worlds import build_world, mover, pose_in
 
 from estimator.axis import angle_between, offset_at
@@ -61,7 +61,6 @@ class Session:
         surprises: Rounds that contradicted earlier ones.
         bumped: Touches on whose way something else met the object.
         stops: Motions between touches that the object ended.
-        motions: Of those, ended or not.
         moved: Of the object, all touches together [mm].
     """
 
@@ -78,7 +77,6 @@ class Session:
     moved: float
     unpressed: int
     stops: int
-    motions: int
 
 
 def exact_belief(surface: SurfaceOfRevolution) -> Belief:
@@ -162,7 +160,7 @@ def _told(
     reason: str,
 ) -> Session:
     last = steps[-1].after if steps else belief
-    open_question = steps[-1].surprise if steps else None
+    open_question = unconfirmed_by(steps)
     surface = world.surface
     middle = surface.axis.point + np.mean(surface.profile.z_range) * surface.axis.direction
     met = GOAL.met_by(last) and open_question is None
@@ -181,7 +179,6 @@ def _told(
         moved=1e3 * sum(r.moved for r in records),
         unpressed=sum(r.met is not None and not r.reached for r in records),
         stops=sum(step.stop is not None for step in steps),
-        motions=0 if isinstance(world, World) else len(world.followed),
     )
 
 

@@ -137,7 +137,7 @@ def _row(table: Table, world: str, name: str, here: list[dict[str, Any]]) -> Non
         f"{np.mean([s['touches'] for s in here]):.1f}",
         f"{np.median(angle):.2f}, 90 % {np.quantile(angle, 0.9):.2f}",
         f"{np.median(offset):.2f}, 90 % {np.quantile(offset, 0.9):.2f}",
-        *(str(sum(s[key] for s in here)) for key in ("surprises", "stops")),
+        *(str(sum(s.get(key, 0) for s in here)) for key in ("surprises", "stops")),
         f"{np.median([s['moved'] for s in here]):.1f}",
     )  # fmt: skip
 

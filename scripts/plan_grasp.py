@@ -30,7 +30,7 @@ import tyro
 from describe_hand import Options as DescribeOptions
 from describe_hand import describe
 from grasp_ending import Ending, ending, ending_record, grip_of, print_ending
-from grasp_moves import act_motions, from_home
+from grasp_moves import act_motions, from_home, unconfirmed_by
 from grasp_report import belief_record, episode_of, print_round, raw_touches
 from output_files import require_writable, write_json
 from plan_options import Options, grasp_options, planner_options, require_sane
@@ -164,7 +164,7 @@ def _conclude(
     console: Console, scenario: Scenario, options: Options, steps: list[Step], reason: str
 ) -> int:
     belief = steps[-1].after if steps else scenario.belief
-    unconfirmed = steps[-1].surprise if steps else None
+    unconfirmed = unconfirmed_by(steps)
     met = scenario.goal.met_by(belief) and unconfirmed is None
     error = _error(belief, scenario.world.surface)
     console.print(

@@ -17,7 +17,6 @@ import numpy as np
 from rich.console import Console
 
 from estimator.axis import Axis
-from estimator.contact import Contact
 from estimator.readers.raw_sensors import RAW_SENSORS, RawSensor, raw_sensor
 from estimator.surface import SurfaceOfRevolution
 from hand_models.hand import Hand
@@ -86,9 +85,9 @@ def mover(world: World | MujocoWorld, sensor: str) -> Move | None:
         told = world.follow(trajectory)
         if not told.ended:
             return None
-        felt = world.records[-1].outcome
-        if isinstance(felt, Contact):
-            felt = replace(felt, finger=told.finger, sensor=sensor)
+        if told.contact is None:
+            return Stop(trajectory, told.time, "")
+        felt = replace(told.contact, finger=told.finger, sensor=sensor)
         return Stop(trajectory, told.time, told.finger, felt)
 
     return move

@@ -57,7 +57,7 @@ class Robot:
             return None
         self.stops -= 1
         if not self.feels:
-            return Stop(trajectory, 0.5, "", Miss(np.array([0.2, 0.0, 0.5]), 0.012))
+            return Stop(trajectory, 0.5, "")
         return Stop(trajectory, 0.5, "index", replace(self.contact, finger="index"))
 
     def explore(self, *, budget=9, options=OPTIONS, move=True):
@@ -109,7 +109,7 @@ def test_what_stops_the_way_in_is_a_touch_and_the_plan_is_made_anew(free):
     assert first.outcomes == () == first.probes
     assert (first.touches, first.felt) == (1, (("index", first.stop.felt),))
     assert len(first.after.contacts) == 1
-    assert first.after.axis != first.before.axis
+    assert np.linalg.norm(first.after.axis.point - first.before.axis.point) > 1e-4
     np.testing.assert_array_equal(first.left.q, first.stop.trajectory.begin.q)
     np.testing.assert_allclose(robot.begins[2].q, robot.begins[1].q, atol=1e-6)
     assert second.stop is None
@@ -125,8 +125,50 @@ def test_a_hand_that_is_always_stopped_and_feels_nothing_ends_with_its_budget(ph
     robot = Robot(stops=100, phase=phase, feels=False)
     steps = robot.explore(budget=3)
     assert [step.touches for step in steps] == [1, 2, 3]
+    assert all(step.felt == () and step.after is step.before for step in steps)
     assert not GOAL.met_by(steps[-1].after)
     assert "touch" not in robot.asked
+    assert step_record(steps[0])["stopped"]["contact"] is None
+
+
+def test_links_keep_farther_away_once_one_has_met_the_object(free):
+    """Truth: the certificates; 1 mm is asked before, 4 and then 7 mm."""
+    robot = Robot(stops=2, feels=False)
+    steps = robot.explore(budget=6)
+    clear = [step.plan.reach.object_clearance for step in steps]
+    assert clear[0] >= 1e-3
+    assert clear[1] >= 4e-3
+    assert clear[2] >= 7e-3
+
+
+def test_a_surprise_that_nothing_has_confirmed_is_still_open_after_a_stop():
+    """A belief that is contradicted, and then a stop that tells nothing."""
+    robot = Robot(stops=0)
+    robot.world.surface = SurfaceOfRevolution(
+        Axis([0.5, 0.0, 0.2], [0.1, 0.0, 1.0]), load_object("can")
+    )
+    moved = SurfaceOfRevolution(Axis([0.5, 0.012, 0.2], [0.1, 0.0, 1.0]), load_object("can"))
+    touch = robot.touch
+
+    def bumped(probe):
+        if robot.asked.count("touch") == 3:
+            robot.world.surface = moved
+        return touch(probe)
+
+    robot.touch = bumped
+    seen = []
+    for step in explore(
+        HAND, robot.touch, robot.belief, sensor_noise("gel"), goal=GOAL, budget=12,
+        rng=np.random.default_rng(0), options=OPTIONS, move=robot.move,
+    ):  # fmt: skip
+        seen.append(step)
+        if step.surprise is not None:
+            robot.stops, robot.feels = 1, False
+    surprised = next(k for k, step in enumerate(seen) if step.surprise is not None)
+    assert not seen[surprised].settled
+    assert seen[surprised + 1].stop is not None
+    assert not seen[surprised + 1].settled
+    assert seen[-1].settled
 
 
 def test_nothing_stops_the_way_out(free):

@@ -23,9 +23,10 @@ from estimator.vectors import Array, Index, Mask
 from hand_models.hand import Hand
 from hand_models.postures import Postures
 from hand_models.spheres import LinkSpheres
-from planner.candidates import END_MARGIN, GAP, Candidates, clear_of_object
+from planner.candidates import END_MARGIN, GAP, Candidates
 from planner.choosing.choice import Ranking
 from planner.choosing.worth import Worth
+from planner.reaching.clear import clear_of
 
 FROM = 4  # placements, the best of those laid
 PLACES = 16  # of each finger from each placement
@@ -80,7 +81,7 @@ def swept(
             _best(triple_scores(own, worth.before, triples, untold=worth.untold), COLLIDING * KEPT)
         ]
         made = _made(hand, postures, candidates, i, reached, best)
-        free = clear_of_object(hand, spheres, surface, made.q, made.R_WB, made.p_WB)
+        free = _clear_of_object(hand, spheres, surface, made.q, made.R_WB, made.p_WB)
         apart = (k for k in np.flatnonzero(free).tolist() if is_self_free(made.q[k]))
         found.append(made.take(np.fromiter(islice(apart, KEPT), dtype=np.intp)))
     return joined(found), scored
@@ -194,3 +195,17 @@ def _made(
         np.repeat(candidates.p_WB[i][None], n, axis=0), reached.theta[triples], reached.z[triples],
         reached.pad_angle[triples], (),
     )  # fmt: skip
+
+
+def _clear_of_object(
+    hand: Hand,
+    spheres: LinkSpheres,
+    surface: SurfaceOfRevolution,
+    q: Array,
+    R_WB: Array,
+    p_WB: Array,
+) -> Mask:
+    """Whether links stay out of the believed object, coarsely (`clear_of`), (N,)."""
+    R_OB = surface.frame @ R_WB
+    p_OB = (p_WB - surface.axis.point) @ surface.frame.T
+    return clear_of(hand, spheres, surface.profile, q, R_OB, p_OB)

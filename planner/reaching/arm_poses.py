@@ -57,14 +57,14 @@ class ArmPoses:
         """Damped least squares; joints, and how far off, 1 at the edge of what is near enough."""
         q, off = q.copy(), np.full(len(q), np.inf)
         left = np.arange(len(q))  # not there yet
-        for _ in range(STEPS):
+        for step_number in range(STEPS + 1):
             error, J = self._errors(q[left], R[left], p[left])
             place = np.linalg.norm(error[:, :3], axis=1) / _PLACE
             angle = np.linalg.norm(error[:, 3:], axis=1) / (_TURN * _ANGLE)
             off[left] = np.maximum(place, angle)
             going = off[left] > _THERE
             left, error, J = left[going], error[going], J[going]
-            if len(left) == 0:
+            if len(left) == 0 or step_number == STEPS:
                 break
             normal = J @ np.swapaxes(J, 1, 2) + _DAMPING * np.eye(6)
             step = np.einsum("nij,ni->nj", J, np.linalg.solve(normal, error[..., None])[..., 0])

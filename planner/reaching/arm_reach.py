@@ -19,6 +19,7 @@ from estimator.vectors import Array
 from hand_models.arm import Arm
 from hand_models.spheres import link_spheres
 from planner.candidates import Candidates
+from planner.funnel import Funnel
 from planner.motions.retreat import Retreat
 from planner.reaching.arm_poses import SEEDS, ArmPoses
 from planner.reaching.turning import Room, clear_turns, evenly, turned
@@ -27,7 +28,7 @@ TURNS = 12  # of a placement about the object's axis
 POSTURES = 12  # of the arm that are solved for a placement, whichever way it is turned
 OUT_OF_REACH = "wrist out of the arm's reach"
 
-Standing = Callable[[Array], str | None]  # what is in the way of a posture (nq,), in words
+InTheWay = Callable[[Array], str | None]  # what a posture (nq,) meets, in words
 
 
 class _Brought(NamedTuple):
@@ -44,19 +45,21 @@ class ArmReach:
         self._arm, self._poses = arm, ArmPoses(arm)
 
     def placements(
-        self, laid: Candidates, surface: SurfaceOfRevolution, room: Room, standing: Standing
+        self, laid: Candidates, surface: SurfaceOfRevolution, room: Room, in_the_way: InTheWay
     ) -> Candidates:
         """Placements of the hand alone that the arm reaches, as placements of the whole.
 
         Args:
             surface: On which they are laid, and about whose axis they may be turned.
             room: What stands about it.
-            standing: Says what is in the way of a posture of the whole.
+            in_the_way: Says what a posture of the whole meets.
         """
+        if len(laid) == 0:
+            return self._whole(laid, [], [], laid.rejected)
         blocked = Counter[str]()
         kept, angles, chosen = [], [], []
         for i, brought in enumerate(self._brought(laid, surface, room)):
-            found = self._first_clear(brought, laid.q[i], standing)
+            found = self._first_clear(brought, laid.q[i], in_the_way)
             if isinstance(found, str):
                 blocked[found] += 1
                 continue
@@ -64,7 +67,11 @@ class ArmReach:
             angles.append(found.angle)
             chosen.append(found.q_arm)
         told = (*laid.rejected, *blocked.items())
-        laid = laid.take(np.array(kept, dtype=np.intp))
+        return self._whole(laid.take(np.array(kept, dtype=np.intp)), angles, chosen, told)
+
+    def _whole(
+        self, laid: Candidates, angles: list[float], chosen: list[Array], rejected: Funnel
+    ) -> Candidates:
         root, n = self._arm.X_WA, len(laid)
         return replace(
             laid,
@@ -72,26 +79,26 @@ class ArmReach:
             R_WB=np.tile(root.rotation, (n, 1, 1)),
             p_WB=np.tile(root.translation, (n, 1)),
             theta=np.angle(np.exp(1j * (laid.theta + np.reshape(angles, (n, 1))))),
-            rejected=told,
+            rejected=rejected,
         )
 
     def _first_clear(
-        self, brought: list[_Brought], q_hand: Array, standing: Standing
+        self, brought: list[_Brought], q_hand: Array, in_the_way: InTheWay
     ) -> _Brought | str:
         """The first with nothing in its way, or what is in the first's way."""
-        fault = OUT_OF_REACH
-        for one in reversed(brought):
-            found = standing(self._arm.joined(one.q_arm, q_hand))
-            if found is None:
+        faults = []
+        for one in brought:
+            fault = in_the_way(self._arm.joined(one.q_arm, q_hand))
+            if fault is None:
                 return one
-            fault = found
-        return fault
+            faults.append(fault)
+        return faults[0] if faults else OUT_OF_REACH
 
     def _brought(
         self, laid: Candidates, surface: SurfaceOfRevolution, room: Room
     ) -> list[list[_Brought]]:
         """For each placement the turns and postures of the arm that bring the hand there, those
-        nearest to home last."""
+        nearest to home first."""
         angles, frame = evenly(TURNS), surface.frame
         R_OB, p_OB = frame @ laid.R_WB, (laid.p_WB - surface.axis.point) @ frame.T
         R_WB, p_WB = turned(surface, R_OB, p_OB, angles)
@@ -108,7 +115,7 @@ class ArmReach:
         q, off = self._poses.solved(seeds[pose, seed], R[pose], p[pose])
         good = (off < 1.0) & np.isfinite(far[rows, best.ravel()])
         out: list[list[_Brought]] = [[] for _ in range(len(laid))]
-        for k in np.argsort(-self._poses.from_home(q)).tolist():
+        for k in np.argsort(self._poses.from_home(q)).tolist():
             if good[k]:
                 out[rows[k]].append(_Brought(float(angles[turn[k]]), q[k]))
         return out

@@ -103,9 +103,8 @@ def _room_faults(
     hand: Hand, collision: HandCollision, options: ReachOptions, found: Solution, share: float
 ) -> Iterator[str]:
     """Links too near to table or boxes; pads may be as near as they like, but not in them."""
-    pads = {finger.name for finger in hand.fingers}
+    pads, where = {finger.name for finger in hand.fingers}, _posture(found, share)
     for body in fixed_bodies(options.table, options.boxes):
-        where = _posture(found, share)
         link, anything = (collision.nearest_to(*where, body, touching=t) for t in (pads, ()))
         if link.distance < options.clearance:
             yield gap_in_words(link)

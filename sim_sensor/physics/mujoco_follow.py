@@ -1,8 +1,8 @@
 """A planned motion in MuJoCo, in its own time, ended by whatever meets the object.
 
-Where the hand is, is carried on from motion to motion; only before the first is it put where the
-motion begins. A guarded motion, or one through free space, ends when a pad or a link is pressed
-with the guard's force; then the hand goes back the way it came.
+A motion begins where the hand is, if its joints are nearly there; else the hand is put there. It
+ends when a pad or a link is pressed with the guard's force, and the hand goes back the way it came.
+The way out is gone to its end, whatever it meets.
 """
 
 from __future__ import annotations
@@ -15,14 +15,23 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial.transform import Rotation, Slerp
 
+from estimator.contact import Contact
 from estimator.vectors import Array, frozen
 from hand_models.hand import Hand
 from sim_sensor.physics.mujoco_contact import NOTHING, touching_object
 from sim_sensor.physics.mujoco_hand import joint_targets, link_name, pad_name
-from sim_sensor.physics.mujoco_press import BACK, SPEED, Press, Tick, set_joints, settle, step
+from sim_sensor.physics.mujoco_press import Press, Tick, set_joints, settle, step
 
-FORCE = 0.5  # at which what no guard ends is ended [N]
+FORCE = 0.5  # at which a motion without a guard ends [N]
 NEAR = 0.05  # of a joint from where a motion begins: the hand is there [rad]
+
+
+class Guarding(Protocol):
+    """What ends a motion."""
+
+    @property
+    def force(self) -> float:
+        """On a pad or a link [N]."""
 
 
 class Timed(Protocol):
@@ -44,6 +53,10 @@ class Timed(Protocol):
     def bases(self) -> tuple[pin.SE3, ...]:
         """Pose of the hand base at each."""
 
+    @property
+    def guard(self) -> Guarding | None:
+        """The contact that ends it; any hard one does."""
+
 
 @dataclass(frozen=True, eq=False)
 class Followed:
@@ -51,33 +64,26 @@ class Followed:
 
     Args:
         time: When it ended [s].
-        finger: Whose pad ended it; empty where none did.
-        press: Of that pad, or of the first one where a link ended it; None where nothing did.
+        ended: Whether something ended it before its time.
         bumped: Links and pads that met the object.
         lag: Largest distance of a joint from its target [rad].
+        finger: Whose pad ended it; empty where none did.
+        press: Of that pad; None where a link ended it, or nothing.
+        contact: What the pad felt, if it could be read.
     """
 
     time: float
-    finger: str
-    press: Press | None
+    ended: bool
     bumped: tuple[str, ...]
     lag: float
-
-    @property
-    def ended(self) -> bool:
-        """Whether something ended it before its time."""
-        return self.press is not None
+    finger: str = ""
+    press: Press | None = None
+    contact: Contact | None = None
 
 
-def follow(
-    model: mujoco.MjModel, data: mujoco.MjData, hand: Hand, way: Timed, force: float = FORCE
-) -> Followed:
-    """Carry a motion out.
-
-    Args:
-        force: On a pad or a link, at which it ends [N].
-    """
-    route = _route(model, hand, way)
+def follow(model: mujoco.MjModel, data: mujoco.MjData, hand: Hand, way: Timed) -> Followed:
+    """Carry a motion out, or as far as nothing is in its way, and back."""
+    route, force = _route(model, hand, way), FORCE if way.guard is None else way.guard.force
     joints = [data.joint(model.actuator(k).name) for k in range(model.nu)]
     if max(abs(float(j.qpos[0]) - t) for j, t in zip(joints, route[0].q, strict=True)) > NEAR:
         set_joints(model, data, route[0].q)
@@ -87,29 +93,32 @@ def follow(
         touching = step(model, data, tick)
         lag = max(lag, *(abs(float(j.qpos[0]) - t) for j, t in zip(joints, tick.q, strict=True)))
         bumped |= {link_name(name) for name in touching}
-        hard = [name for name, felt in touching.items() if felt.force >= force]
-        if hard and way.phase != "leave":
-            first = next((name for name in hard if name in pads), None)
-            press = _pressed(model, data, route, at, first or next(iter(pads)), force)
-            for back in route[at :: -round(BACK / SPEED)]:
+        if way.phase != "leave" and any(felt.force >= force for felt in touching.values()):
+            pad = max(pads, key=lambda name: touching.get(name, NOTHING).force)
+            felt = touching.get(pad, NOTHING)
+            press = _pressed(model, data, route, at, pad, force) if felt.force >= force else None
+            for back in route[at::-1]:
                 step(model, data, back)
-            time, finger = at * model.opt.timestep, pads[first] if first else ""
-            return Followed(time, finger, press, tuple(sorted(bumped)), lag)
-    return Followed(float(way.times[-1]), "", None, tuple(sorted(bumped)), lag)
+            told = (True, tuple(sorted(bumped)), lag, pads[pad] if press else "", press)
+            return Followed(at * model.opt.timestep, *told)
+    return Followed(float(way.times[-1]), ended=False, bumped=tuple(sorted(bumped)), lag=lag)
 
 
 def _pressed(
     model: mujoco.MjModel, data: mujoco.MjData, route: list[Tick], at: int, pad: str, force: float
-) -> Press:
-    """The pad brought to the force asked for, along the way; one that feels nothing stays there."""
-    met = touching_object(model, data).get(pad, NOTHING).met
-    if met is not None:
-        at = settle(model, data, route, at, pad, force)
+) -> Press | None:
+    """The pad brought to the force asked for, along the way; None where it loses the object, as
+    something else carries the load."""
+    met = touching_object(model, data)[pad].met
+    at = settle(model, data, route, at, pad, force)
     touching = touching_object(model, data)
     felt = touching.pop(pad, NOTHING)
+    if felt.met is None:
+        return None
     return Press(
         frozen(data.geom(pad).xpos), route[at].place, frozen(data.qpos), route[at].X_WB,
-        met, felt.met, felt.force, met is not None, tuple(sorted(map(link_name, touching))), 0.0,
+        met, felt.met, felt.force, felt.force >= 0.5 * force,
+        tuple(sorted(map(link_name, touching))), 0.0,
     )  # fmt: skip
 
 

@@ -124,15 +124,16 @@ class MujocoWorld:
         return record.outcome
 
     def follow(self, way: Timed) -> Followed:
-        """Carry a motion between touches out; what ends it is one more record."""
+        """Carry a motion between touches out; what a finger feels of its end is one more record."""
         before = self._data.body(OBJECT).xpos.copy()
         told = follow(self._models.moving, self._data, self._hand, way)
-        self._followed.append(told)
         if told.press is not None:
-            finger = told.finger or self._hand.fingers[0].name
-            record = self._record(finger, told.press, None)
-            moved = float(np.linalg.norm(self._data.body(OBJECT).xpos - before))
-            self._records.append(replace(record, moved=moved))
+            record = self._record(told.finger, told.press, None)
+            if isinstance(record.outcome, Contact):
+                moved = float(np.linalg.norm(self._data.body(OBJECT).xpos - before))
+                self._records.append(replace(record, moved=moved))
+                told = replace(told, contact=record.outcome)
+        self._followed.append(told)
         return told
 
     @property
