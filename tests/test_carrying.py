@@ -135,7 +135,7 @@ def test_links_keep_farther_away_once_one_has_met_the_object(free):
     """Truth: the certificates; 1 mm is asked before, 4 and then 7 mm."""
     robot = Robot(stops=2, feels=False)
     steps = robot.explore(budget=6)
-    clear = [step.plan.reach.object_clearance for step in steps]
+    clear = [step.plan.reach.certificate.links[1] for step in steps]
     assert clear[0] >= 1e-3
     assert clear[1] >= 4e-3
     assert clear[2] >= 7e-3

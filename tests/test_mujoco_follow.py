@@ -71,7 +71,7 @@ def stopped(*, by_pad: bool) -> tuple[MujocoWorld, Followed]:
     """The first of some shifts of the object with which a pad, or a link, ends the way in."""
     rng = np.random.default_rng(0)
     for _ in range(40):
-        world = world_where_believed(shift=rng.uniform(-0.04, 0.04, 3))
+        world = world_where_believed(shift=rng.uniform(-0.04, 0.04, 3) * [1.0, 1.0, 0.0])
         told = world.follow(planned().motion.enter)
         if told.ended and bool(told.finger) == by_pad:
             return world, told

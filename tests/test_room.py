@@ -154,7 +154,7 @@ def test_an_arm_without_a_clear_placement_says_so():
 def test_what_an_arm_meets_is_told_by_its_links():
     """A beam over the object: the hand goes beside it, some postures of the arm do not."""
     hand, surface = load_hand("allegro_right_ur5"), standing("barrel")
-    beam = Box((0.4, 0.0, 0.65), (0.04, 1.6, 0.04), name="the beam")
+    beam = Box((0.3, 0.0, 0.45), (0.04, 1.6, 0.04), name="the beam")
     tools = hand_tools(hand, ruled(boxes=(beam,), table=(0.0, 0.0, 1.0, 0.0)))
     found = tools.candidates(surface, 3, count=200, rng=np.random.default_rng(0))
     told = {reason for reason, _ in found.rejected}
