@@ -40,6 +40,7 @@ from sim_sensor.objects import load_object
 
 CRITERIA: tuple[Criterion, ...] = ("information", "pair-bound", "d-optimal", "uniform", "random")
 PARTS = ("limits", "criteria", "times")
+TICKS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0)  # of the picture
 
 
 @dataclass(frozen=True)
@@ -219,9 +220,10 @@ def picture(criteria: Sequence[Criterion], points: list[Point]) -> bytes:
             (line,) = axes.plot(shown, middle, marker="o", ms=3, label=criterion)
             axes.fill_between(shown, low, high, color=line.get_color(), alpha=0.08, lw=0)
         axes.set(xlabel="touches", ylabel=f"error of the {words}", yscale="log", xticks=counts)
+        axes.set_yticks([t for t in TICKS if axes.get_ylim()[0] < t < axes.get_ylim()[1]])
         axes.yaxis.set_major_formatter("{x:g}")
-        axes.yaxis.set_minor_formatter("{x:g}")
-        axes.grid(alpha=0.3, which="both")
+        axes.minorticks_off()
+        axes.grid(alpha=0.3)
     figure.axes[0].legend(fontsize=8)
     file = io.BytesIO()
     figure.savefig(file, format="png", dpi=130)
