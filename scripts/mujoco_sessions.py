@@ -124,7 +124,7 @@ def session(hand: str, name: str, seed: int, world: str, *, mass: float = 0.3) -
     steps: list[Step] = []
     reason = ""
     try:
-        for step in _steps(hand, here, belief, seed):
+        for step in carried_out(hand, here, belief, seed):
             steps.append(step)
     except NoPlan as error:
         reason = str(error)
@@ -136,7 +136,9 @@ def _plan(hand: str, surface: SurfaceOfRevolution, rng: np.random.Generator) -> 
     return plan_probes(_hand(hand), belief, sensor_noise(SENSOR), goal=GOAL, rng=rng)
 
 
-def _steps(hand: str, world: World | MujocoWorld, belief: Belief, seed: int) -> Iterator[Step]:
+def carried_out(hand: str, world: World | MujocoWorld, belief: Belief, seed: int) -> Iterator[Step]:
+    """A session with the default goal; where the world can, every motion is carried out."""
+
     def touch(probe: Probe) -> Contact | Miss:
         felt = world.touch(probe.approach, finger_axis_W=probe.approach.finger_axis)
         if isinstance(felt, Miss):

@@ -6,8 +6,8 @@ import json
 from dataclasses import replace
 
 import numpy as np
-import pinocchio as pin
 import pytest
+from grasp_moves import from_home
 
 from estimator.axis import Axis
 from estimator.contact import Contact, Miss
@@ -18,7 +18,6 @@ from planner.carrying import Stop
 from planner.explore import explore
 from planner.goal import Goal
 from planner.messages import step_record
-from planner.motions.trajectory import Configuration
 from planner.options import PlannerOptions
 from sim_sensor.camera import coarse_view
 from sim_sensor.noise import simulated_sensor
@@ -27,10 +26,7 @@ from sim_sensor.world import World
 
 HAND = load_hand("allegro_right")
 GOAL = Goal(np.deg2rad(3.0), 2e-3)
-HOME = Configuration(
-    HAND.home, pin.SE3(pin.rpy.rpyToMatrix(0.0, 1.2, 0.0), np.array([0.15, 0.0, 0.45]))
-)
-OPTIONS = PlannerOptions(placements=400, certify=False, start=HOME)
+OPTIONS = from_home(HAND, PlannerOptions(placements=400, certify=False))
 
 
 class Robot:
@@ -81,7 +77,7 @@ def test_motions_are_asked_for_in_order_each_where_the_last_one_ended(free):
         wanted += ["transfer", "enter", *["touch"] * len(step.plan.probes), "leave"]
     assert robot.asked == wanted
     assert all(step.stop is None for step in steps)
-    at = HOME
+    at = OPTIONS.start
     for step in steps:
         motion = step.plan.motion
         for one in (motion.transfer, motion.enter):
@@ -131,7 +127,7 @@ def test_a_hand_that_is_always_stopped_and_feels_nothing_ends_with_its_budget(ph
     assert step_record(steps[0])["stopped"]["contact"] is None
 
 
-def test_links_keep_farther_away_once_one_has_met_the_object(free):
+def test_links_keep_farther_away_once_one_has_met_the_object():
     """Truth: the certificates; 1 mm is asked before, 4 and then 7 mm."""
     robot = Robot(stops=2, feels=False)
     steps = robot.explore(budget=6)
@@ -143,10 +139,7 @@ def test_links_keep_farther_away_once_one_has_met_the_object(free):
 
 def test_a_surprise_that_nothing_has_confirmed_is_still_open_after_a_stop():
     """A belief that is contradicted, and then a stop that tells nothing."""
-    robot = Robot(stops=0)
-    robot.world.surface = SurfaceOfRevolution(
-        Axis([0.5, 0.0, 0.2], [0.1, 0.0, 1.0]), load_object("can")
-    )
+    robot = Robot()
     moved = SurfaceOfRevolution(Axis([0.5, 0.012, 0.2], [0.1, 0.0, 1.0]), load_object("can"))
     touch = robot.touch
 

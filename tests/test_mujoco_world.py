@@ -265,6 +265,7 @@ def test_an_object_that_was_pushed_is_noticed_and_found_where_it_is_now() -> Non
     found, moved = 0, []
     for seed in range(1, 9):
         steps, surface, pushed = pushed_session(seed)
+        assert pushed < 30e-3
         if pushed > 5e-3:
             moved.append(seed)
             assert any(step.surprise is not None and "moved" in step.surprise for step in steps)
@@ -275,7 +276,7 @@ def test_an_object_that_was_pushed_is_noticed_and_found_where_it_is_now() -> Non
         assert np.rad2deg(angle_between(axis, surface.axis)) < 4.0
         assert offset_at(axis, surface.axis, surface.axis.point) < 3e-3
     assert len(moved) >= 6
-    assert found >= 4
+    assert found >= 5
 
 
 def test_a_held_object_cannot_be_pushed() -> None:

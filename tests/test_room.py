@@ -124,6 +124,7 @@ def test_turned_placements_touch_where_they_say():
     """Truth: Pinocchio's pads against the surface, as far off as when they were laid."""
     surface, tools, found = placements(boxes=(SHELF,))
     place = surface.at(found.theta, found.z)
+    assert len(found) > 50
     for i in range(len(found)):
         pads = tools.hand.at(found.q[i], found.base(i))
         rows = found.fingers[i]

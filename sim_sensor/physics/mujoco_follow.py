@@ -117,8 +117,7 @@ def _pressed(
         return None
     return Press(
         frozen(data.geom(pad).xpos), route[at].place, frozen(data.qpos), route[at].X_WB,
-        met, felt.met, felt.force, felt.force >= 0.5 * force,
-        tuple(sorted(map(link_name, touching))), 0.0,
+        met, felt.met, felt.force, True, tuple(sorted(map(link_name, touching))), 0.0,
     )  # fmt: skip
 
 

@@ -119,8 +119,7 @@ class MujocoWorld:
         before = self._data.body(OBJECT).xpos.copy()
         pressed = press(self._models.moving, self._data, self._hand, path)
         record = self._record(path.finger, pressed, finger_axis_W)
-        moved = float(np.linalg.norm(self._data.body(OBJECT).xpos - before))
-        self._records.append(replace(record, moved=moved))
+        self._keep(record, before)
         return record.outcome
 
     def follow(self, way: Timed) -> Followed:
@@ -130,11 +129,15 @@ class MujocoWorld:
         if told.press is not None:
             record = self._record(told.finger, told.press, None)
             if isinstance(record.outcome, Contact):
-                moved = float(np.linalg.norm(self._data.body(OBJECT).xpos - before))
-                self._records.append(replace(record, moved=moved))
+                self._keep(record, before)
                 told = replace(told, contact=record.outcome)
         self._followed.append(told)
         return told
+
+    def _keep(self, record: MujocoRecord, before: Array) -> None:
+        """A record, with how far the object is from where it was before."""
+        moved = float(np.linalg.norm(self._data.body(OBJECT).xpos - before))
+        self._records.append(replace(record, moved=moved))
 
     @property
     def followed(self) -> tuple[Followed, ...]:
