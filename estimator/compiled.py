@@ -70,7 +70,7 @@ def _compiled(function: F, *, from_python: bool) -> F:
     numba.config.CACHE_DIR = str(_folder(Path(str(package.__file__)).parent))  # read by the next
     try:
         found = numba.njit(
-            cache=True, error_model="numpy", fastmath=FAST,
+            cache=True, error_model="numpy", fastmath=FAST, nogil=True,
             no_cfunc_wrapper=True, no_cpython_wrapper=not from_python,
         )(function)  # fmt: skip
     finally:

@@ -18,6 +18,7 @@ from estimator.prior import AxisPrior
 from estimator.problem import Problems, pose_problems, problem_at
 from estimator.readings import ERRORS, Readings, exact_readings
 from estimator.search import DRAMATICALLY_WORSE
+from estimator.side_by_side import in_shares
 from estimator.sight import LOCAL, fill_motions, seen_from
 from estimator.surface import Geometry
 from estimator.vectors import Array
@@ -40,10 +41,14 @@ def contact_information(
     Returns:
         (B, n, 5, 5) over (t1, t2, w1, w2, delta) in the chart at each axis.
     """
-    readings = exact_readings(geometry, noise)
-    out = np.zeros((*readings.shape[:2], WITH_ROTATION, WITH_ROTATION))
     lines = np.ascontiguousarray(np.concatenate([points, directions], axis=1))
-    _fill_information(readings, lines, out)
+    out = np.zeros((*geometry.p.shape[:2], WITH_ROTATION, WITH_ROTATION))
+
+    def tell(part: slice) -> None:
+        some = Geometry(*(x[part] for x in vars(geometry).values()))
+        _fill_information(exact_readings(some, noise), lines[part], out[part])
+
+    in_shares(tell, len(out))
     return out
 
 

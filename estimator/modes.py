@@ -11,6 +11,7 @@ from estimator.peaks import Peaks, describe, evidence_of, leader_of
 from estimator.problem import Problems, problem_at
 from estimator.search import MOST_PEAKS, bench, find_peaks, sort_into
 from estimator.seeds import complex_lines, most_seeds
+from estimator.side_by_side import in_shares
 from estimator.vectors import Array, Index
 from estimator.work import copied, work_space
 
@@ -61,18 +62,19 @@ def find_modes(problems: Problems) -> Modes:
         np.zeros((S, M, 4)),
         np.zeros((S, M), dtype=np.intp),
     )
-    _fill(problems, complex_lines(problems.readings), modes)
+    lines = complex_lines(problems.readings)
+    in_shares(lambda part: _fill(problems, lines, modes, part.start, part.stop), S)
     return modes
 
 
 @compiled
-def _fill(problems: Problems, extra: Array, modes: Modes) -> None:
-    """Search, weigh and describe, one set after the other."""
+def _fill(problems: Problems, extra: Array, modes: Modes, first: int, end: int) -> None:
+    """Search, weigh and describe the sets from `first` to before `end`, one after the other."""
     n, D = problems.readings.shape[1], modes.x.shape[2]
     work = work_space(D - 2, n)
     room = bench(most_seeds(n) + extra.shape[1], D)
     states, costs = np.zeros((MOST_PEAKS, D)), np.zeros(MOST_PEAKS)
-    for s in range(problems.readings.shape[0]):
+    for s in range(first, end):
         problem = problem_at(problems, s)
         count = find_peaks(problem, extra[s], room, work, states, costs)
         for k in range(count):

@@ -20,7 +20,7 @@ from estimator.assumptions import SMOOTH, Roughness
 from estimator.batches import ContactSets
 from estimator.contact import Contact, SensorNoise
 from estimator.surface import Geometry
-from estimator.vectors import Array, Mask, cross
+from estimator.vectors import Array, Index, Mask, cross
 
 UMBILIC = 3.0  # half difference of curvatures in its own sd, below which directions are void
 DOUBTFUL = 5.0  # ... below which contacts are also judged together
@@ -131,13 +131,14 @@ def stacked_readings(
         together: Whether contacts of doubtful direction are also judged together.
     """
     out = np.zeros((*kappa_read.shape[:2], COLUMNS))
-    known = {s: _summary(s) for s in set(noise)}
-    table = np.array([known[s] for s in noise], dtype=np.float64).reshape(len(noise), 8)
+    kinds, kind = _kinds(noise)
+    table = np.array([_summary(s) for s in kinds], dtype=np.float64).reshape(len(kinds), 8)[kind]
     out[..., EDGE] = edge = table[:, 0]
     out[..., SD_POSITION:COVARIANCE] = table[:, 1:]
     unmeasured = np.isinf(edge)
-    Sigma = np.zeros((*out.shape[:2], ERRORS, ERRORS))
-    _fill_covariances(Sigma, noise, covariances, unmeasured)
+    stated = np.array([_independent(s) for s in kinds]).reshape(-1, ERRORS, ERRORS)[kind]
+    Sigma = np.tile(stated, (len(out), 1, 1, 1))
+    _fill_covariances(Sigma, covariances, unmeasured)
     for i, measured in covariances.items():
         out[:, i, SD_POSITION:SD_SHARE] = _sds_of(np.broadcast_to(measured, (len(out), 8, 8)))
     censored = np.isnan(kappa_read)
@@ -182,16 +183,21 @@ def _sds_of(covariances: Array) -> Array:
     return np.asarray(np.sqrt(np.maximum(np.stack(square, axis=1), least)))
 
 
-def _fill_covariances(
-    Sigma: Array, noise: Sequence[SensorNoise], measured: Mapping[int, Array], unmeasured: Mask
-) -> None:
-    """What each contact was told, else independent errors of the sizes its sensor states."""
-    told = np.array([i in measured for i in range(len(noise))], dtype=bool)
-    for s in set(noise):
-        tensor = [max(s.mean_curvature, LEAST), *[max(s.deviator, LEAST)] * 2]
-        sds = [*[s.position] * 3, *[s.normal] * 2, *tensor]
-        alike = np.array([other == s for other in noise], dtype=bool)
-        Sigma[:, alike & ~told] = np.diag(np.square(sds))
+def _kinds(noise: Sequence[SensorNoise]) -> tuple[list[SensorNoise], Index]:
+    """The objects among them, and which one each is: thousands are told apart by identity."""
+    kinds = {id(s): s for s in noise}
+    number = {key: k for k, key in enumerate(kinds)}
+    return list(kinds.values()), np.array([number[id(s)] for s in noise], dtype=np.intp)
+
+
+def _independent(noise: SensorNoise) -> Array:
+    """Covariance of independent errors of the sizes that a sensor states, (8, 8)."""
+    tensor = [max(noise.mean_curvature, LEAST), *[max(noise.deviator, LEAST)] * 2]
+    return np.diag(np.square([*[noise.position] * 3, *[noise.normal] * 2, *tensor]))
+
+
+def _fill_covariances(Sigma: Array, measured: Mapping[int, Array], unmeasured: Mask) -> None:
+    """What contacts were told instead of what sensors state, nothing of what is unmeasured."""
     for i, covariance in measured.items():
         Sigma[:, i] = _HALVED @ covariance @ _HALVED.T
     Sigma[:, unmeasured, _MEAN:] = 0.0

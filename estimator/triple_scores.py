@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.compiled import compiled, compiled_part
+from estimator.side_by_side import in_shares
 from estimator.vectors import Array, Index
 
 LOWER = np.tril_indices(5)  # how a symmetric 5x5 matrix is packed
@@ -76,7 +77,12 @@ def triple_scores(
         raise ValueError(f"triples: expected places 0 to {places - 1}, as many as the grid has")
     out = np.zeros(len(triples))
     packed = np.ascontiguousarray(information[..., LOWER[0], LOWER[1]])
-    _fill_scores(packed, np.asarray(before, dtype=np.float64)[LOWER], untold**2, triples, out)
+    known = np.asarray(before, dtype=np.float64)[LOWER]
+
+    def score(part: slice) -> None:
+        _fill_scores(packed, known, untold**2, triples[part], out[part])
+
+    in_shares(score, len(triples), least=_AT_A_TIME)
     return out
 
 

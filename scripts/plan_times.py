@@ -1,7 +1,7 @@
 """Where a plan's time goes: candidates, choice, reach, approaches, checks.
 
-Whole plans are timed as they are; the shares are a profiler's, whose own cost favours none of the
-parts much. One core, after a plan that compiles and loads everything.
+Whole plans are timed as they are, on one core and on all, after a plan that compiles and loads
+everything; the shares are a profiler's on one core, whose own cost favours none of the parts much.
 """
 
 from __future__ import annotations
@@ -9,7 +9,9 @@ from __future__ import annotations
 import cProfile
 import pstats
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +19,7 @@ import numpy as np
 from estimator.axis import Axis
 from estimator.belief import Belief
 from estimator.sensors import sensor_noise
+from estimator.side_by_side import available_cores, on_cores
 from estimator.surface import SurfaceOfRevolution
 from hand_models import load_hand
 from hand_models.hand import Hand
@@ -26,6 +29,7 @@ from planner.plan import NoPlan, plan_probes
 from sim_sensor.camera import coarse_view
 from sim_sensor.objects import load_object
 
+Job = tuple[str, int]  # object, seed
 GOAL = Goal(float(np.deg2rad(3.0)), 2e-3)
 PARTS: dict[str, tuple[tuple[str, str], ...]] = {  # (module, function)
     "candidates": (("candidates", "placement_candidates"), ("candidates", "single_candidates")),
@@ -39,9 +43,10 @@ PARTS: dict[str, tuple[tuple[str, str], ...]] = {  # (module, function)
 
 @dataclass(frozen=True)
 class PlanTimes:
-    """Seconds of each plan, and the mean share of each part [-]."""
+    """Seconds of each plan on one core and on all, and the mean share of each part [-]."""
 
     seconds: tuple[float, ...]
+    on_all: tuple[float, ...]
     shares: dict[str, float]
 
 
@@ -52,18 +57,28 @@ def plan_times(
     hand, options = load_hand(hand_name), PlannerOptions(certify=certify)
     jobs = [(objects[seed % len(objects)], seed) for seed in range(plans)]
     _plan(hand, sensor, options, jobs[0])
-    seconds = []
-    for job in jobs:
-        start = time.perf_counter()
-        _plan(hand, sensor, options, job)
-        seconds.append(time.perf_counter() - start)
+    one, every = (
+        _timed(partial(_plan, hand, sensor, options), jobs, cores)
+        for cores in (1, available_cores())
+    )
     profiler = cProfile.Profile()
-    for job in jobs:
-        profiler.runcall(_plan, hand, sensor, options, job)
-    return PlanTimes(tuple(seconds), _shares(pstats.Stats(profiler)))
+    with on_cores(1):
+        for job in jobs:
+            profiler.runcall(_plan, hand, sensor, options, job)
+    return PlanTimes(one, every, _shares(pstats.Stats(profiler)))
 
 
-def _plan(hand: Hand, sensor: str, options: PlannerOptions, job: tuple[str, int]) -> None:
+def _timed(plan: Callable[[Job], None], jobs: list[Job], cores: int) -> tuple[float, ...]:
+    seconds = []
+    with on_cores(cores):
+        for job in jobs:
+            start = time.perf_counter()
+            plan(job)
+            seconds.append(time.perf_counter() - start)
+    return tuple(seconds)
+
+
+def _plan(hand: Hand, sensor: str, options: PlannerOptions, job: Job) -> None:
     name, seed = job
     rng = np.random.default_rng([seed, 41])
     try:

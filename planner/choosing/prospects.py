@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimator.belief import SampledObjects
+from estimator.side_by_side import in_shares
 from estimator.singular import PlacedTriples
 from estimator.surface import Geometry, geometry_at
 from estimator.vectors import Array, Mask
@@ -73,11 +74,17 @@ def prospects(samples: SampledObjects, p_W: Array, n_W: Array, *, pad: float) ->
 def _met(surfaces: SampledSurfaces, p: Array, n: Array, pad: float) -> Array:
     """What pads on lines p - s n (M, 3) meet, (B, M, 6) as `fill_met` has it."""
     objects, met = surfaces.objects, np.zeros((len(surfaces.objects.points), len(p), 6))
-    fill_met(
-        np.asarray(objects.z), surfaces.profiles.coefficients, np.asarray(objects.points),
-        surfaces.frames, np.ascontiguousarray(p), np.ascontiguousarray(n),
-        np.full(len(p), pad), np.array([-1.5 * BEFORE, 1.5 * BEHIND]), STEPS, EDGE, met,
-    )  # fmt: skip
+    z, pieces, origins = np.asarray(objects.z), surfaces.profiles.coefficients, objects.points
+    lines = (np.ascontiguousarray(p), np.ascontiguousarray(n), np.full(len(p), pad))
+    range_s = np.array([-1.5 * BEFORE, 1.5 * BEHIND])
+
+    def meet(part: slice) -> None:
+        fill_met(
+            z, pieces[part], origins[part], surfaces.frames[part], *lines, range_s, STEPS, EDGE,
+            met[part],
+        )  # fmt: skip
+
+    in_shares(meet, len(met))
     return met
 
 

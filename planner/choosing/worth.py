@@ -9,6 +9,7 @@ import numpy as np
 from estimator.belief import Belief, SampledObjects
 from estimator.contact import SensorNoise
 from estimator.information import contact_information, known_before, with_untold_rotation
+from estimator.side_by_side import in_shares
 from estimator.singular import margins
 from estimator.surface import Geometry
 from estimator.triple_scores import in_goals
@@ -57,8 +58,14 @@ class Worth:
 
     def covariances(self, landed: Prospects) -> Array:
         """Mean square errors after each candidate on each object, in goals, (B, N, 4, 4)."""
-        total = self.before + self.information(landed).sum(axis=2)
-        return with_untold_rotation(total, self.before, self.untold)
+        told, before = self.information(landed), self.before
+        after = np.empty((*told.shape[:2], 4, 4))
+
+        def invert(part: slice) -> None:
+            after[part] = with_untold_rotation(before + told[part].sum(axis=2), before, self.untold)
+
+        in_shares(invert, len(after))
+        return after
 
     def least_margins(self, landed: Prospects) -> Array:
         """Margin that three of four objects keep from each singularity, (N, K)."""

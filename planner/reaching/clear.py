@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from estimator.profile import Profile
+from estimator.side_by_side import in_shares
 from estimator.vectors import Array, Mask
 from hand_models.chains import chains_of
 from hand_models.hand import Hand
@@ -38,5 +39,11 @@ def clear_of(
     shapes, out = np.column_stack([spheres.centres, spheres.radii]), np.zeros(len(q), dtype=bool)
     q, R, p, between = (np.ascontiguousarray(x) for x in (q, R_OB, p_OB, between))
     chains, meridian = chains_of(hand), meridian_of(profile)
-    fill_clear(chains, meridian, spheres.joints, shapes, allowed, q, R, p, between, out)
+    in_shares(
+        lambda i: fill_clear(
+            chains, meridian, spheres.joints, shapes, allowed, q[i], R[i], p[i], between[i], out[i]
+        ),
+        len(q),
+        least=100,
+    )
     return out

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from estimator.side_by_side import in_shares
 from estimator.surface import SurfaceOfRevolution
 from estimator.vectors import Array, Index, basis_across
 from hand_models.batch_pads import batch_pads
@@ -81,10 +82,16 @@ def lay(
     q, R, p = (np.array(x, dtype=float) for x in (poses.q, poses.R, poses.p))
     places = np.zeros((*fingers.shape, 4))
     ends = np.array(inset(surface.profile.z_range))
-    rest(
-        chains_of(hand), meridian_of(surface.profile), ends, _WITHIN * cone, iterations,
-        np.asarray(fingers, dtype=np.intp), q, R, p, places,
-    )  # fmt: skip
+    chains, meridian = chains_of(hand), meridian_of(surface.profile)
+    pads = np.ascontiguousarray(fingers, dtype=np.intp)
+
+    def settle(part: slice) -> None:
+        rest(
+            chains, meridian, ends, _WITHIN * cone, iterations, pads[part], q[part], R[part],
+            p[part], places[part],
+        )  # fmt: skip
+
+    in_shares(settle, len(q), least=20)
     return Laid(q, R, p, *np.moveaxis(places, -1, 0))
 
 
