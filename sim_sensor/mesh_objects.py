@@ -14,7 +14,6 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from estimator.axis import Axis, from_chart
 from estimator.cloud import fit_cloud
@@ -198,6 +197,8 @@ def _heights(theta: Array, z: Array) -> tuple[float, float]:
 
 def _profile(low: float, high: float, z: Array, rho: Array) -> SplineProfile:
     """Smoothed medians of the radius over heights, z = 0 in the middle."""
+    from scipy.signal import savgol_filter  # half a second, for who scans
+
     count = int((high - low) / _BIN)
     if count <= _SMOOTH:
         raise ValueError(f"its wall is only {1e3 * (high - low):.0f} mm high")
