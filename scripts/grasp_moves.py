@@ -45,12 +45,15 @@ def unconfirmed_by(steps: Sequence[Step]) -> str | None:
 def act_motions(
     hand: Hand, limits: MotionLimits, step: Step, records: Sequence[TouchRecord]
 ) -> list[ActMotion | None]:
-    """One placement as it went: each finger up to where it stopped, and back from there."""
+    """One placement as it went: each finger up to where it stopped, and back from there.
+
+    Where something ended a motion before, that motion is all there was.
+    """
     motion = step.plan.motion
     if motion is None:
         return [None] * len(records)
     if step.stop is not None:
-        return [_stopped(motion, step.stop) for _ in records]
+        return [_stopped(motion, step.stop)]
     acts: list[ActMotion | None] = []
     pairs = zip(step.plan.probes, motion.probes, records, strict=True)
     for j, (probe, (forward, _), record) in enumerate(pairs):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,7 +28,7 @@ from planner.messages import step_record
 from planner.motions.round_motion import RoundMotion
 from planner.plan import Plan, Probe
 from sim_sensor.feeling import Felt
-from sim_sensor.viewer.episode import Act, BelievedAxis, Episode, Grip
+from sim_sensor.viewer.episode import Act, BelievedAxis, Block, Episode, Grip
 from sim_sensor.viewer.moves import ActMotion
 from sim_sensor.viewer.pictures import Signal
 from sim_sensor.world import TouchRecord, World
@@ -143,14 +144,19 @@ def episode_of(
     sensor: str = "",
     grip: Grip | None = None,
     motions: Motions | None = None,
+    room: tuple[Block, ...] = (),
 ) -> Episode:
     """Each touch with the belief just before and just after it, and the grip at the end."""
     acts: list[Act] = []
+    records = iter(world.records)
     for step in steps:
-        belief, records = step.before, world.records[len(acts) :][: len(step.felt)]
-        paced = [None] * len(records) if motions is None else motions(step, records)
+        own = list(islice(records, len(step.felt)))
+        paced = [None] * len(step.plan.probes) if motions is None else motions(step, own)
+        if step.stop is not None and not step.felt:
+            acts.append(_link_stop(step, step.stop, paced[0]))
+        belief = step.before
         for (finger, outcome), (path, bases), record, motion in zip(
-            step.felt, _ways(step), records, paced, strict=True
+            step.felt, _ways(step), own, paced[: len(own)], strict=True
         ):
             after = update(belief, [outcome])
             acts.append(
@@ -168,7 +174,15 @@ def episode_of(
                 )
             )
             belief = after
-    return Episode(surface, tuple(acts), conclusion=conclusion, grip=grip)
+    return Episode(surface, tuple(acts), conclusion=conclusion, grip=grip, room=room)
+
+
+def _link_stop(step: Step, stop: Stop, motion: ActMotion | None) -> Act:
+    """The motion up to where a link met the object; nothing was learnt but that."""
+    way = stop.trajectory
+    at = float(np.interp(stop.time, way.times, np.arange(len(way.times))))
+    belief = BelievedAxis(step.before.axis, step.before.covariance)
+    return Act("the hand", way.q, way.bases, at, None, belief, belief, motion=motion)
 
 
 def _ways(step: Step) -> list[tuple[Array, tuple[pin.SE3, ...]]]:

@@ -16,9 +16,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
+from estimator.vectors import Array, basis_across
 from planner.motions.surroundings import Box
+from planner.reaching.reach_task import ReachOptions
+from sim_sensor.viewer.episode import Block
 
+BOARD = (0.8, 0.8, 0.01)  # of a table, as it is shown [m]
 TABLE, BOX = {"table_mm", "box"}, {"name", "centre_mm", "size_mm", "yaw_deg"}
 
 
@@ -40,6 +45,22 @@ def read_obstacles(path: Path | None) -> dict[str, Any]:
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, ValueError) as error:
         raise ValueError(f"--obstacles {path}: {error}") from None
     return {"table": plane, "boxes": boxes}
+
+
+def blocks(reach: ReachOptions, object_W: Array) -> tuple[Block, ...]:
+    """Table and boxes as the page shows them; the table is a board below the object.
+
+    Args:
+        object_W: Where the object is, (3,) [m].
+    """
+    shown = [Block(box.pose, np.array(box.size)) for box in reach.boxes]
+    if reach.table is not None:
+        n, height = np.array(reach.table[:3]), reach.table[3]
+        below = object_W - (object_W @ n - height + 0.5 * BOARD[2]) * n
+        across = basis_across(n)
+        R = np.column_stack([across[0], across[1], n])
+        shown.append(Block(pin.SE3(R, below), np.array(BOARD)))
+    return tuple(shown)
 
 
 def _box(told: Mapping[str, Any], number: int) -> Box:

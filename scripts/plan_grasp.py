@@ -32,6 +32,7 @@ from describe_hand import describe
 from grasp_ending import Ending, ending, ending_record, grip_of, print_ending
 from grasp_moves import act_motions, from_home, unconfirmed_by
 from grasp_report import belief_record, episode_of, print_round, raw_touches
+from obstacle_file import blocks
 from output_files import require_writable, write_json
 from plan_options import Options, grasp_options, planner_options, require_sane
 from rich.console import Console
@@ -230,6 +231,7 @@ def _write(
         episode = episode_of(
             world.surface, world, steps, words, options.sensor, grip_of(scenario.hand, end),
             partial(act_motions, scenario.hand, scenario.planner.limits),
+            blocks(scenario.planner.reach, world.surface.axis.point),
         )  # fmt: skip
         write_page(out / "probes.html", scenario.hand, episode)
         written.append("probes.html")

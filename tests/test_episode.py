@@ -14,9 +14,10 @@ from episodes import TRUE_AXIS, episode_of
 from estimator.axis import from_chart, to_chart
 from estimator.vectors import basis_across
 from hand_models.hand import Hand, load_hand
-from sim_sensor.viewer.episode import Act, BelievedAxis, Episode, Grip
+from sim_sensor.viewer.episode import Act, BelievedAxis, Block, Episode, Grip
 from sim_sensor.viewer.meshes import tube_mesh
 from sim_sensor.viewer.moves import ActMotion, Move
+from sim_sensor.viewer.scene import build_scene
 from sim_sensor.viewer.timeline import STAY, captions, end_of, postures, schedule
 from sim_sensor.viewer.view import write_page
 
@@ -163,3 +164,41 @@ def test_a_grip_in_time_is_played_at_its_own_speed(hand: Hand, episode: Episode)
     assert end_of(gripped, beats) == pytest.approx(frames[-1].time)
     with pytest.raises(ValueError, match="ascending from zero"):
         Grip(act.path, act.bases, "closing", times[::-1])
+
+
+def test_a_motion_that_a_link_ended_is_shown_and_teaches_nothing(hand, episode, tmp_path):
+    """The hand goes as far as it came, nothing is drawn as felt, and the next act begins there."""
+    first, second, *rest = episode.acts
+    stopped = replace(second, finger="the hand", outcome=None, after=second.before, stop=2.5)
+    told = replace(episode, acts=(first, stopped, *rest))
+    beats = schedule(told.acts)
+    q, _ = stopped.posture(hand.model, 2.5)
+    frames = postures(hand.model, told, beats)
+    there = min(frames, key=lambda frame: abs(frame.time - beats[1].touch))
+    np.testing.assert_allclose(there.q, q, atol=1e-9)
+    heads = [line["head"] for line in captions(told, beats)]
+    assert "Probe 2 of 4: the hand is stopped: a link meets the object, and feels nothing" in heads
+    paths = [command["path"] for command in build_scene(hand, told).commands]
+    assert any("/touched/0/" in path for path in paths)
+    assert not any("/touched/1/" in path for path in paths)
+    assert write_page(tmp_path / "page.html", hand, told).exists()
+
+
+def test_what_stands_about_is_shown_and_does_not_stand_between(hand, episode):
+    bare = build_scene(hand, episode)
+    middle = 0.5 * (bare.camera.eye + episode.centre)
+    wall = Block(pin.SE3(np.eye(3), middle), [0.05, 0.05, 0.05])
+    shown = build_scene(hand, replace(episode, room=(wall,)))
+    added = [c for c in shown.commands if "/room/0" in c["path"]]
+    assert {command["type"] for command in added} == {"set_object", "set_transform"}
+    way = np.linspace(shown.camera.eye, episode.centre, 200)
+    assert not np.any(np.all(np.abs(way - middle) < 0.025, axis=1))
+    far = Block(pin.SE3(np.eye(3), middle + np.array([0.0, 0.0, 1.0])), [0.05, 0.05, 0.05])
+    aside = build_scene(hand, replace(episode, room=(far,)))
+    np.testing.assert_array_equal(aside.camera.eye, bare.camera.eye)
+
+
+@pytest.mark.parametrize("size", [[0.1, 0.0, 0.1], [0.1, -1.0, 0.1]])
+def test_a_block_without_extent_is_refused(size):
+    with pytest.raises(ValueError, match="block size: expected three positive lengths"):
+        Block(pin.SE3.Identity(), size)

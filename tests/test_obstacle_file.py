@@ -3,8 +3,9 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from obstacle_file import read_obstacles
+from obstacle_file import BOARD, blocks, read_obstacles
 
+from planner.motions.surroundings import Box
 from planner.reaching.reach_task import ReachOptions
 
 
@@ -59,3 +60,18 @@ def test_what_is_wrong_is_said_in_one_line(tmp_path, text, words):
 def test_a_file_that_is_not_there_is_named(tmp_path):
     with pytest.raises(ValueError, match=r"--obstacles .*nowhere.toml: .*No such file"):
         read_obstacles(tmp_path / "nowhere.toml")
+
+
+def test_the_page_shows_a_table_below_the_object_and_every_box(tmp_path):
+    """The board's upper face lies in the table's plane, below the object, however it leans."""
+    box = Box((0.5, 0.2, 0.1), (0.1, 0.2, 0.3), (0.0, 0.0, np.sin(0.3), np.cos(0.3)))
+    n = np.array([0.1, -0.2, 1.0]) / np.linalg.norm([0.1, -0.2, 1.0])
+    object_W = np.array([0.5, 0.0, 0.2])
+    shown_box, board = blocks(ReachOptions(boxes=(box,), table=(*n, 0.03)), object_W)
+    np.testing.assert_array_equal(shown_box.X_WC.homogeneous, box.pose.homogeneous)
+    np.testing.assert_array_equal(shown_box.size, box.size)
+    face = board.X_WC.translation + 0.5 * BOARD[2] * board.X_WC.rotation[:, 2]
+    np.testing.assert_allclose(board.X_WC.rotation[:, 2], n, atol=1e-12)
+    assert face @ n == pytest.approx(0.03, abs=1e-12)
+    np.testing.assert_allclose(np.cross(object_W - face, n), 0.0, atol=1e-12)
+    assert blocks(ReachOptions(), object_W) == ()

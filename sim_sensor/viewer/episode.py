@@ -77,7 +77,8 @@ class Act:
         path: Configurations of the whole hand on the approach, in order, shape (K, nq).
         bases: Pose of the hand base in the world for each of them (`X_WB`), or one for all.
         stop: Where on the path the finger stopped, counted in its points with fractions.
-        outcome: What it felt, or that it met nothing.
+        outcome: What it felt, or that it met nothing; None where a link met the object instead,
+            which feels nothing.
         before: What was believed of the axis before.
         after: What is believed with this touch.
         note: Shown with the caption.
@@ -91,7 +92,7 @@ class Act:
     path: Array
     bases: tuple[pin.SE3, ...]
     stop: float
-    outcome: Contact | Miss
+    outcome: Contact | Miss | None
     before: BelievedAxis
     after: BelievedAxis
     note: str = ""
@@ -116,6 +117,27 @@ class Act:
         if len(self.bases) == 1:
             return q, self.bases[0]
         return q, pin.SE3.Interpolate(self.bases[i], self.bases[j], at - i)
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """A box that stands there, a table's board as well.
+
+    Args:
+        X_WC: Pose of its middle in the world.
+        size: Along its own axes, (3,) [m].
+    Raises:
+        ValueError: A size that is not positive.
+    """
+
+    X_WC: pin.SE3
+    size: Array
+
+    def __post_init__(self) -> None:
+        size = finite_array("block size", self.size, (3,))
+        if np.any(size <= 0.0):
+            raise ValueError(f"block size: expected three positive lengths, got {size.tolist()}")
+        object.__setattr__(self, "size", size)
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,6 +180,7 @@ class Episode:
         title: Heading of the page.
         conclusion: Shown when all is over.
         grip: How the object is taken hold of at last; None where it is not.
+        room: What stands about it.
     Raises:
         ValueError: No act.
     """
@@ -167,6 +190,7 @@ class Episode:
     title: str = "Finding an axis by touch"
     conclusion: str = ""
     grip: Grip | None = None
+    room: tuple[Block, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.acts:

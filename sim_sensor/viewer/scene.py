@@ -21,12 +21,14 @@ from sim_sensor.viewer.timeline import Beat, Posture, end_of, postures, schedule
 from sim_sensor.viewer.viewer_commands import (
     Command,
     set_ball,
+    set_box,
     set_mesh,
+    set_pose,
     set_property,
     set_stick,
 )
 
-BEFORE, AFTER, GHOST, TRUTH = 0xE69F00, 0x009E73, 0x7FA6C9, 0x1F3A5F
+BEFORE, AFTER, GHOST, TRUTH, ROOM = 0xE69F00, 0x009E73, 0x7FA6C9, 0x1F3A5F, 0x9A8C7A
 NORMAL, DIRECTION, TOUCH, MISSED = 0x1F4FD8, 0xCC0E8F, 0x111111, 0xD62728
 _STICK, _NORMAL_LENGTH, _AXIS_RADIUS = 0.022, 0.030, 0.0010  # [m]
 _XRAY: dict[str, Any] = {"opacity": 0.9, "depthTest": False}  # seen through the fingers
@@ -104,7 +106,7 @@ def build_scene(hand: Hand, episode: Episode) -> Scene:
     beats = schedule(episode.acts)
     duration = end_of(episode, beats) + 2.0
     frames = postures(hand.model, episode, beats)
-    stage = [*room(), *links(hand), *_truth(episode)]
+    stage = [*room(), *_blocks(episode), *links(hand), *_truth(episode)]
     tracks = [*hand_tracks(hand, frames)]
     for i, (act, beat) in enumerate(zip(episode.acts, beats, strict=True)):
         end = None if i == len(beats) - 1 else beat.end
@@ -182,6 +184,14 @@ def _truth(episode: Episode) -> Iterator[Command]:
     )
 
 
+def _blocks(episode: Episode) -> Iterator[Command]:
+    """What stands about the object; translucent, so that it hides nothing."""
+    for k, block in enumerate(episode.room):
+        path = f"/room/{k}"
+        yield set_box(path, block.size, ROOM, opacity=0.3)
+        yield set_pose(path, block.X_WC.rotation, block.X_WC.translation)
+
+
 def _belief(path: str, belief: BelievedAxis, color: int, episode: Episode) -> Iterator[Command]:
     """The believed axis as a line, and its 95 % region as a tube."""
     u = belief.axis.direction
@@ -194,6 +204,8 @@ def _belief(path: str, belief: BelievedAxis, color: int, episode: Episode) -> It
 
 def _outcome(path: str, act: Act) -> Iterator[Command]:
     """A contact's point, normal and two directions; a red ball where a finger met nothing."""
+    if act.outcome is None:
+        return
     if not isinstance(act.outcome, Contact):
         tip, radius = act.outcome.tip, act.outcome.radius
         yield from set_ball(f"{path}/miss", tip, radius, MISSED, opacity=0.4)
@@ -221,19 +233,40 @@ def _hand_place(hand: Hand, act: Act) -> Array:
 
 
 def _camera(hand: Hand, episode: Episode) -> Camera:
-    """Beside the line from the object to the hand, raised, on the side that is touched."""
+    """Beside the line from the object to the hand, raised, on the side that is touched.
+
+    From the other side, or from higher up, where something stands in between.
+    """
     behind = np.mean([_hand_place(hand, act) for act in episode.acts], axis=0) - episode.centre
     side = np.cross([0.0, 0.0, 1.0], behind)
     side = unit(side) if np.linalg.norm(side) > 0.02 else np.array([0.0, -1.0, 0.0])
-    touched = np.mean([_place(act) for act in episode.acts], axis=0) - episode.centre
+    touched = np.mean([_place(act, episode) for act in episode.acts], axis=0) - episode.centre
     side *= 1.0 if touched @ side >= 0 else -1.0
-    away = unit(side + 0.3 * unit(behind) + np.array([0.0, 0.0, 0.4]))
     # a little below the middle: the caption covers the bottom of the picture
     target = episode.centre + 0.3 * behind - np.array([0.0, 0.0, 0.04])
     comes = any(act.motion is not None for act in episode.acts)  # from farther away
     distance = episode.half_height + (0.52 if comes else 0.40)
-    return Camera(frozen(target + distance * away), frozen(target))
+    eyes = [
+        target + distance * unit(sign * side + 0.3 * unit(behind) + np.array([0.0, 0.0, up]))
+        for up in (0.4, 1.0)
+        for sign in (1.0, -1.0)
+    ]
+    free = (eye for eye in eyes if not _covered(episode, eye))
+    return Camera(frozen(next(free, eyes[0])), frozen(target))
 
 
-def _place(act: Act) -> Array:
+def _covered(episode: Episode, eye: Array) -> bool:
+    """Whether something stands between an eye and the object."""
+    on_the_way = eye + np.linspace(0.0, 0.95, 60)[:, None] * (episode.centre - eye)
+    for block in episode.room:
+        in_block = (on_the_way - block.X_WC.translation) @ block.X_WC.rotation
+        if np.any(np.all(np.abs(in_block) < 0.5 * block.size, axis=1)):
+            return True
+    return False
+
+
+def _place(act: Act, episode: Episode) -> Array:
+    """Where it touched, or meant to."""
+    if act.outcome is None:
+        return episode.centre
     return act.outcome.position if isinstance(act.outcome, Contact) else act.outcome.tip

@@ -148,8 +148,7 @@ def captions(episode: Episode, beats: tuple[Beat, ...]) -> list[dict[str, object
     for number, (act, beat) in enumerate(zip(episode.acts, beats, strict=True), start=1):
         name = f"Probe {number} of {len(episode.acts)}: {act.finger}"
         before, after = (_sureness(episode, act, i) for i in (0, 1))
-        felt = isinstance(act.outcome, Contact)
-        doing = (f"{name} approaches", f"{name} {'touches' if felt else 'meets nothing'}")
+        doing = (f"{name} approaches", f"{name} {_end_words(act)}")
         begins = beat.start
         if act.motion is not None and act.motion.come is not None:
             head = f"Probe {number} of {len(episode.acts)}: the hand comes"
@@ -165,6 +164,12 @@ def captions(episode: Episode, beats: tuple[Beat, ...]) -> list[dict[str, object
     end = "\n".join(line for line in (f"believed axis: {last}", episode.conclusion) if line)
     lines.append(_caption(end_of(episode, beats), "Done", end))
     return lines
+
+
+def _end_words(act: Act) -> str:
+    if act.outcome is None:
+        return "is stopped: a link meets the object, and feels nothing"
+    return "touches" if isinstance(act.outcome, Contact) else "meets nothing"
 
 
 def _caption(time: float, head: str, body: str) -> dict[str, object]:

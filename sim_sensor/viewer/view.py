@@ -35,6 +35,7 @@ _LEGEND = (
     ("contact: two principal directions, not told apart", colours.DIRECTION),
     ("met nothing", colours.MISSED),
 )
+_ROOM = ("what stands about it", colours.ROOM)
 
 
 def write_page(path: str | Path, hand: Hand, episode: Episode) -> Path:
@@ -83,7 +84,7 @@ def _render(scene: Scene, episode: Episode) -> str:
     return page_text(
         scene,
         title=episode.title,
-        legend=_LEGEND,
+        legend=(*_LEGEND, _ROOM) if episode.room else _LEGEND,
         captions=captions(episode, scene.beats),
         signals=_signals(scene, episode),
     )

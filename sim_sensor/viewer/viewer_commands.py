@@ -33,6 +33,11 @@ def set_stick(
     yield set_pose(path, np.stack([x, y, z], axis=1), 0.5 * (begin + end))
 
 
+def set_box(path: str, size: Array, color: int, **more: Any) -> Command:
+    """A box about its node [m]; `more` goes to `set_shape`."""
+    return set_shape(path, shapes.Box([float(v) for v in size]), color, **more)
+
+
 def set_mesh(path: str, mesh: Mesh, color: int, **more: Any) -> Command:
     """Triangles; `more` goes to `set_shape`."""
     triangles = shapes.TriangularMeshGeometry(mesh.vertices, mesh.faces)
