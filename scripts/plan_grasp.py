@@ -37,7 +37,7 @@ from output_files import require_writable, write_json
 from plan_options import Options, grasp_options, planner_options, require_sane
 from rich.console import Console
 from views import belief_by
-from worlds import build_world, mover, pose_in, print_object, sensor_in
+from worlds import among_what_stands, build_world, mover, pose_in, print_object, sensor_in
 
 from estimator.axis import angle_between, offset_at
 from estimator.belief import Belief
@@ -117,21 +117,24 @@ def _scenario(options: Options) -> Scenario:
         )
     planner = from_home(hand, planner_options(options))
     require_room(hand, planner.reach)
+    belief = belief_by(
+        options.view,
+        surface,
+        angle=np.deg2rad(options.prior_angle_deg),
+        offset=1e-3 * options.prior_offset_mm,
+        rng=rng,
+    )
+    world = build_world(options.world, hand, surface, options.sensor, rng)
+    planner = among_what_stands(options.world, surface, planner)
     return Scenario(
         surface=surface,
-        belief=belief_by(
-            options.view,
-            surface,
-            angle=np.deg2rad(options.prior_angle_deg),
-            offset=1e-3 * options.prior_offset_mm,
-            rng=rng,
-        ),
+        belief=belief,
         told=sensor_noise(options.sensor),
-        world=build_world(options.world, hand, surface, options.sensor, rng),
+        world=world,
         hand=hand,
         goal=Goal(np.deg2rad(options.goal_angle_deg), 1e-3 * options.goal_offset_mm),
         planner=planner,
-        grasp=grasp_options(options),
+        grasp=grasp_options(options, planner.reach),
     )
 
 

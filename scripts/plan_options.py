@@ -11,6 +11,7 @@ from obstacle_file import read_obstacles
 
 from planner.grasping.grasp import Friction, GraspOptions
 from planner.options import PlannerOptions
+from planner.reaching.reach_task import ReachOptions
 from planner.reaching.workspace import Workspace
 
 
@@ -87,14 +88,14 @@ def planner_options(options: Options) -> PlannerOptions:
     return PlannerOptions(reach=replace(reach, workspace=workspace))
 
 
-def grasp_options(options: Options) -> GraspOptions:
-    """The defaults, within the arm's workspace, at the user's heights."""
+def grasp_options(options: Options, told: ReachOptions) -> GraspOptions:
+    """The defaults, within the workspace and among the obstacles told of, at the user's heights."""
     heights = options.grasp_heights_mm
     if heights is not None and not heights[0] < heights[1]:
         raise ValueError(f"--grasp-heights-mm: expected low < high, got {heights}")
     if not (np.isfinite(options.friction) and options.friction > 0.0):
         raise ValueError(f"--friction: expected a number > 0, got {options.friction}")
-    default, told = GraspOptions(), planner_options(options).reach
+    default = GraspOptions()
     return replace(
         default,
         reach=replace(default.reach, workspace=told.workspace, table=told.table, boxes=told.boxes),

@@ -21,7 +21,9 @@ from estimator.readers.raw_sensors import RAW_SENSORS, RawSensor, raw_sensor
 from estimator.surface import SurfaceOfRevolution
 from hand_models.hand import Hand
 from planner.carrying import Move, Stop
+from planner.motions.surroundings import Box
 from planner.motions.trajectory import Trajectory
+from planner.options import PlannerOptions
 from sim_sensor.mesh_objects import SUFFIXES, read_mesh
 from sim_sensor.noise import simulated_sensor
 from sim_sensor.signals.raw_sense import raw_sense
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
     from sim_sensor.physics.mujoco_world import MujocoWorld
 
 WORLDS = ("own", "mujoco", "mujoco-table")
+GIVE = 0.2e-3  # how far a touch moves what stands on a table [m]
 _DEFAULT, _OF_MUJOCO = "gel", "gel-depth"
 
 
@@ -74,6 +77,20 @@ def build_world(
         raise ValueError(f"--world {world}: needs the extra 'mujoco' ({error})") from None
     standing = Standing() if world == "mujoco-table" else None
     return MujocoWorld(hand, surface, rng=rng, standing=standing)
+
+
+def among_what_stands(
+    world: str, surface: SurfaceOfRevolution, options: PlannerOptions
+) -> PlannerOptions:
+    """The planner's options with the table that the object stands on, and how a touch moves it."""
+    if world != "mujoco-table":
+        return options
+    from sim_sensor.physics.mujoco_object import BOARD_SIZE, board
+
+    centre = board(surface)
+    table = Box((centre[0], centre[1], centre[2]), BOARD_SIZE, name="the table")
+    reach = replace(options.reach, boxes=(*options.reach.boxes, table))
+    return replace(options, reach=reach, give=GIVE)
 
 
 def mover(world: World | MujocoWorld, sensor: str) -> Move | None:

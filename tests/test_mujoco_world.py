@@ -17,7 +17,7 @@ import mujoco
 from commands import script
 from grasp_moves import from_home
 from mujoco_sessions import exact_belief
-from worlds import mover, sensor_in
+from worlds import among_what_stands, mover, sensor_in
 
 from estimator.axis import Axis, angle_between, offset_at
 from estimator.contact import Contact, Miss
@@ -241,6 +241,7 @@ def pushed_session(seed: int) -> tuple[list[Step], SurfaceOfRevolution, float]:
     world = MujocoWorld(HAND, surface, rng=rng, standing=Standing())
     belief = coarse_view(surface, angle=np.deg2rad(15.0), offset=0.015, rng=rng)
     options = from_home(HAND, PlannerOptions(placements=600, certify=False))
+    options = among_what_stands("mujoco-table", surface, options)
     pushed: list[float] = []
 
     def touch(probe: Probe) -> Contact | Miss:
@@ -259,24 +260,24 @@ def pushed_session(seed: int) -> tuple[list[Step], SurfaceOfRevolution, float]:
 
 
 def test_an_object_that_was_pushed_is_noticed_and_found_where_it_is_now() -> None:
-    """Eight cans: every motion is noticed, no axis is wrong. Each touch moves a can by a tenth of a
-    millimetre or two, so that some sessions stay doubtful until the budget is spent: measured, six
-    of eight are sure of the right axis by then."""
-    found, moved = 0, []
+    """Eight cans on their table. Each touch moves one by a tenth of a millimetre or two, which the
+    planner is told of (`give`): told nothing, it takes that for a motion in one session of six."""
+    moved, surprises = 0, 0
     for seed in range(1, 9):
         steps, surface, pushed = pushed_session(seed)
+        noticed = [step for step in steps if step.surprise and "moved" in step.surprise]
         assert pushed < 30e-3
         if pushed > 5e-3:
-            moved.append(seed)
-            assert any(step.surprise is not None and "moved" in step.surprise for step in steps)
-        if not (GOAL.met_by(steps[-1].after) and steps[-1].settled):
-            continue
-        found += 1
+            moved += 1
+            assert noticed
+        surprises += len(noticed)
+        assert GOAL.met_by(steps[-1].after)
+        assert steps[-1].settled
         axis = steps[-1].after.axis
         assert np.rad2deg(angle_between(axis, surface.axis)) < 4.0
         assert offset_at(axis, surface.axis, surface.axis.point) < 3e-3
-    assert len(moved) >= 6
-    assert found >= 5
+    assert moved >= 6
+    assert surprises <= moved + 2  # of touches alone, none to speak of
 
 
 def test_a_held_object_cannot_be_pushed() -> None:

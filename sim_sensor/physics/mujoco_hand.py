@@ -15,6 +15,7 @@ from estimator.vectors import Array
 from hand_models.geometry import link_points, pad_in_joint
 from hand_models.hand import Hand
 from hand_models.joints import joint_motion, joint_motions
+from sim_sensor.physics.mujoco_object import STOPS
 
 BASE = "base"
 ARMATURE = 2e-3  # of the gears [kg m^2] or [kg]
@@ -26,7 +27,7 @@ FINGER_MASS = 0.18  # that a pad feels of its finger [kg]
 _LIGHTEST = 1e-3  # link [kg]
 _OWN_PAD = 1.08  # points of a tip's mesh within so many pad radii are the pad's own
 _FLAT = 1e-3  # least extent of a hull, as a singular value [m]
-_TOUCHABLE, _TOUCHES = 0, 1  # contype and conaffinity: a hand meets objects, not itself
+_TOUCHABLE, _TOUCHES = 0, 1 | STOPS  # contype and conaffinity: a hand meets objects, not itself
 
 
 def add_hand(spec: mujoco.MjSpec, hand: Hand, *, links: bool, object_mass: float = np.inf) -> None:

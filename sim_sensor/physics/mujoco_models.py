@@ -16,12 +16,16 @@ from estimator.surface import SurfaceOfRevolution
 from hand_models.hand import Hand
 from sim_sensor.physics.mujoco_hand import add_hand, pad_name
 from sim_sensor.physics.mujoco_object import (
+    BOARD,
+    BOARD_SIZE,
     CARRIES,
     OBJECT,
+    STOPS,
     TABLE,
     add_felt_mesh,
     add_object,
     add_slices,
+    board,
     foot,
 )
 from sim_sensor.physics.mujoco_skin import add_skin, settle_skins
@@ -108,9 +112,16 @@ def _spec() -> mujoco.MjSpec:
 
 
 def _add_table(spec: mujoco.MjSpec, surface: SurfaceOfRevolution, standing: Standing) -> None:
-    """A plane under the object's lower end; it carries the object and lets the hand pass."""
+    """A plane under the object's lower end carries it, a board of the same height stops the hand.
+
+    A can stands stiller on a plane than on a box; the hand may stand beside a table, not in it.
+    """
     spec.worldbody.add_geom(
         name=TABLE, type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1.0, 1.0, 0.1],
         pos=foot(surface), friction=[standing.friction, 5e-3, 1e-4], condim=4,
         contype=CARRIES, conaffinity=0,
+    )  # fmt: skip
+    spec.worldbody.add_geom(
+        name=BOARD, type=mujoco.mjtGeom.mjGEOM_BOX, size=0.5 * np.array(BOARD_SIZE),
+        pos=board(surface), contype=STOPS, conaffinity=0,
     )  # fmt: skip

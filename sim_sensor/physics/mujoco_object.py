@@ -16,8 +16,10 @@ from estimator.surface import SurfaceOfRevolution
 from estimator.vectors import Array
 from sim_sensor.scanned import wall_radius
 
-OBJECT, TABLE = "object", "table"
+OBJECT, TABLE, BOARD = "object", "table", "board"
 CARRIES = 2  # bit of what carries the object without meeting the hand
+STOPS = 4  # bit of what stops the hand without meeting the object
+BOARD_SIZE = (0.5, 0.5, 0.02)  # of the table, as the hand meets it [m]
 _SLICES, _SIDES = 28, 64
 _RINGS, _SEGMENTS, _OCTREE = 81, 192, 7  # sagitta of a facet: 10 um at a radius of 80 mm
 
@@ -38,9 +40,15 @@ def place_object(model: mujoco.MjModel, surface: SurfaceOfRevolution) -> None:
     body.pos[:], body.quat[:] = surface.axis.point, _quat(surface)
     if body.jntnum[0]:
         model.joint(OBJECT).qpos0[:] = np.concatenate([surface.axis.point, _quat(surface)])
-    table = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, TABLE)
-    if table >= 0:
-        model.geom_pos[table] = foot(surface)
+    for name, place in ((TABLE, foot(surface)), (BOARD, board(surface))):
+        geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name)
+        if geom >= 0:
+            model.geom_pos[geom] = place
+
+
+def board(surface: SurfaceOfRevolution) -> Array:
+    """Middle of the table's board under what stands on it, world [m]."""
+    return np.asarray(foot(surface) - [0.0, 0.0, 0.5 * BOARD_SIZE[2]])
 
 
 def foot(surface: SurfaceOfRevolution) -> Array:
