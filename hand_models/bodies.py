@@ -1,10 +1,12 @@
-"""What a hand may meet, as convex parts."""
+"""What a hand may meet, as convex parts, and how far a shape is from it."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import coal
+import numpy as np
 import pinocchio as pin
 
 
@@ -25,3 +27,23 @@ class Body:
     X_WO: pin.SE3
     around: coal.CollisionGeometry | None = None
     still: bool = False
+
+
+def distance_from(
+    shape: coal.CollisionGeometry,
+    at: coal.Transform3s,
+    parts: Sequence[coal.CollisionGeometry],
+    there: coal.Transform3s,
+) -> float:
+    """Of a convex shape from the nearest of some parts, negative where they overlap [m]."""
+    request, result = coal.DistanceRequest(), coal.DistanceResult()
+    nearest = np.inf
+    for part in parts:
+        result.clear()
+        nearest = min(nearest, coal.distance(shape, at, part, there, request, result))
+    return float(nearest)
+
+
+def as_coal(X: pin.SE3) -> coal.Transform3s:
+    """A pose as coal takes it."""
+    return coal.Transform3s(X.rotation, X.translation)

@@ -86,7 +86,11 @@ class HandTools:
         bodies = [(body, 0.0) for body in fixed_bodies(self.rules.table, self.rules.boxes)]
         bodies.append((object_body(believed_solid(surface)), -INTRUSION))
 
+        free = self.collision.among(bodies)
+
         def met_by(q: Array) -> str | None:
+            if free.is_free(q, root):
+                return None
             if not self.collision.is_self_free(q):
                 return "the arm folded into itself or the hand"
             for body, least in bodies:

@@ -11,9 +11,10 @@ import pinocchio as pin
 import pytest
 
 from hand_models.batch import batch_placements
-from hand_models.collision import HandCollision, revolved_slices
+from hand_models.collision import HandCollision
 from hand_models.geometry import link_points, vertices
 from hand_models.hand import Hand, HandError, load_hand
+from hand_models.slices import revolved_slices
 from hand_models.spheres import LinkSpheres, link_spheres
 
 

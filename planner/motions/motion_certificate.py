@@ -96,15 +96,8 @@ def _nearest(around: Surroundings, trajectory: Trajectory) -> dict[str, LinkPair
     """The smallest distance to each thing over all waypoints."""
     guard = trajectory.guard
     last = np.inf if guard is None or guard.expected is None else guard.expected + _ROUNDING
-    moved = np.append(True, np.any(np.diff(trajectory.q, axis=0) != 0.0, axis=1))
     touching = [trajectory.touching if time <= last else None for time in trajectory.times]
-    return _smallest(
-        found
-        for q, X_WB, those, itself in zip(
-            trajectory.q, trajectory.bases, touching, moved.tolist(), strict=True
-        )
-        for found in around.pairs(q, X_WB, touching=those, itself=itself)
-    )
+    return around.nearest(trajectory.q, trajectory.bases, touching)
 
 
 def _smallest(found: Iterable[tuple[str, LinkPair]]) -> dict[str, LinkPair]:

@@ -15,6 +15,7 @@ import numpy as np
 import pinocchio as pin
 from ompl import base, geometric, util
 
+from hand_models.broadphase import Among
 from planner.motions.trajectory import Array, Configuration
 
 if TYPE_CHECKING:
@@ -49,24 +50,24 @@ class _Joints:
 
 
 def sampled_path(
-    movable: Movable, begin: Configuration, end: Configuration, *, margin: float, checks: int
+    movable: Movable, begin: Configuration, end: Configuration, free: Among, *, checks: int
 ) -> list[Configuration] | None:
     """Corners of a way round, straight in joints and base between them; None if none was found.
 
     The same arguments give the same way: the effort is counted in checks, not in time.
 
     Args:
-        margin: Least distance of the hand from the believed object [m].
+        free: Says whether a configuration is.
         checks: How many configurations may be checked.
     """
     few = _along_line(movable, begin.q, end.q)
     if few is not None:
-        found = _search(movable, (begin, end), few, margin, checks // 2)
+        found = _search(movable, (begin, end), few, free, checks // 2)
         if found is not None:
             return found
     weight = _JOINT_WEIGHT if movable.hand.arm is None else _ARM_WEIGHT
     every = _Joints(movable.hand.lower, movable.hand.upper, (begin.q, end.q), weight, lambda q: q)
-    return _search(movable, (begin, end), every, margin, checks)
+    return _search(movable, (begin, end), every, free, checks)
 
 
 def _along_line(movable: Movable, begin: Array, end: Array) -> _Joints | None:
@@ -98,7 +99,7 @@ def _search(
     movable: Movable,
     ends: tuple[Configuration, Configuration],
     joints: _Joints,
-    margin: float,
+    free: Among,
     checks: int,
 ) -> list[Configuration] | None:
     util.setLogLevel(util.LogLevel.LOG_NONE)
@@ -117,7 +118,7 @@ def _search(
         at = place(state)
         if not movable.workspace.allows(at.X_WB.rotation[None], at.X_WB.translation[None])[0]:
             return False
-        return movable.around.is_free(at.q, at.X_WB, margin)
+        return free.is_free(at.q, at.X_WB)
 
     setup = geometric.SimpleSetup(space)
     setup.setStateValidityChecker(is_valid)

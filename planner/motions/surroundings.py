@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 import coal
@@ -10,7 +10,10 @@ import numpy as np
 import pinocchio as pin
 
 from hand_models.bodies import Body
-from hand_models.collision import HandCollision, LinkPair, revolved_slices
+from hand_models.broadphase import Among
+from hand_models.collision import HandCollision, LinkPair
+from hand_models.nearest import nearest_on_way
+from hand_models.slices import revolved_slices
 from planner.motions.trajectory import Array
 from planner.reaching.solid import RevolvedSolid
 
@@ -66,35 +69,34 @@ class Surroundings:
     object: Body
     fixed: tuple[Body, ...] = ()
 
-    def pairs(
-        self,
-        q: Array,
-        X_WB: pin.SE3,
-        *,
-        touching: Collection[str] | None = (),
-        itself: bool = True,
-    ) -> Iterator[tuple[str, LinkPair]]:
-        """The nearest pair with each thing: `ITSELF`, and each body.
+    def pairs(self, q: Array, X_WB: pin.SE3) -> Iterator[tuple[str, LinkPair]]:
+        """The nearest pair with each thing: `ITSELF`, and each body."""
+        yield ITSELF, self.collision.self_clearance(q)
+        for body in (*self.fixed, self.object):
+            yield body.name, self.collision.nearest_to(q, X_WB, body)
+
+    def keeping(self, margin: float) -> Among:
+        """What says at once whether all keeps `ROOM` from table and boxes, and so far from the
+        object [m]."""
+        return self.collision.among([*((body, ROOM) for body in self.fixed), (self.object, margin)])
+
+    def nearest(
+        self, q: Array, bases: Sequence[pin.SE3], touching: Sequence[Collection[str] | None]
+    ) -> dict[str, LinkPair]:
+        """The smallest distance to each thing over all waypoints, with the names.
 
         Args:
-            touching: Fingers whose pads may touch the object; None if it does not count at all.
-            itself: Whether the hand may meet itself: not if its joints are as they were.
+            q, bases: (K, nq) joints and K poses of the base.
+            touching: At each, fingers whose pads may touch the object; None if it does not count.
         """
-        if itself:
-            yield ITSELF, self.collision.self_clearance(q)
-        for body in self.fixed:
-            yield body.name, self.collision.nearest_to(q, X_WB, body)
-        if touching is not None:
-            yield OBJECT, self.collision.nearest_to(q, X_WB, self.object, touching=touching)
-
-    def is_free(self, q: Array, X_WB: pin.SE3, margin: float) -> bool:
-        """Whether nothing is near and the object farther than a margin; stops at the first."""
-        if not self.collision.is_self_free(q):
-            return False
-        nearest = self.collision.nearest_to
-        if any(nearest(q, X_WB, body).distance < ROOM for body in self.fixed):
-            return False
-        return nearest(q, X_WB, self.object).distance >= margin
+        moved = np.append(True, np.any(np.diff(q, axis=0) != 0.0, axis=1))
+        found = {ITSELF: self.collision.nearest_links(q[moved])}
+        nobody: list[Collection[str]] = [()] * len(q)
+        for body, those in [*((body, nobody) for body in self.fixed), (self.object, touching)]:
+            pair = nearest_on_way(self.collision, q, bases, body, those)
+            if pair is not None:
+                found[body.name] = pair
+        return found
 
 
 def surroundings(

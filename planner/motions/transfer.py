@@ -13,6 +13,7 @@ from itertools import pairwise
 import numpy as np
 import pinocchio as pin
 
+from hand_models.broadphase import Among
 from hand_models.collision import HandCollision
 from hand_models.hand import Hand
 from planner.motions.motion_certificate import MotionCertificate, certify_motion
@@ -104,11 +105,11 @@ def plan_transfer(
         for thing, pair in near.items():
             if pair.distance < (0.0 if thing == ITSELF else ROOM):
                 return f"{gap_in_words(pair)} {word}"
-    direct = _line(begin, end)
-    straight = _blocked(movable, direct, margin) or _timed(movable, direct, margin)
+    direct, free = _line(begin, end), movable.around.keeping(margin)
+    straight = _blocked(movable, free, direct, margin) or _timed(movable, direct, margin)
     if not isinstance(straight, str):
         return straight
-    found = sampled_path(movable, begin, end, margin=margin, checks=CHECKS)
+    found = sampled_path(movable, begin, end, free, checks=CHECKS)
     if found is None:
         return f"straight, {straight}, and no way round in {CHECKS} configurations"
     return _rounded(movable, found, margin)
@@ -127,12 +128,12 @@ def _rounded(movable: Movable, corners: list[Configuration], margin: float) -> T
 
 
 def _blocked(
-    movable: Movable, path: tuple[Array, tuple[pin.SE3, ...]], margin: float
+    movable: Movable, free: Among, path: tuple[Array, tuple[pin.SE3, ...]], margin: float
 ) -> str | None:
     """What is in the way at the first point of a path that is not free: cheaper than its times."""
     least = {body.name: ROOM for body in movable.around.fixed} | {ITSELF: 0.0, OBJECT: margin}
     for q, X_WB in zip(*path, strict=True):
-        if movable.around.is_free(q, X_WB, margin):
+        if free.is_free(q, X_WB):
             continue
         for thing, pair in movable.around.pairs(q, X_WB):
             if pair.distance < least[thing]:

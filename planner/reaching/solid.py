@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import BSpline, PchipInterpolator
 
 from estimator.surface import SurfaceOfRevolution
-from hand_models.collision import revolved_slices
+from hand_models.slices import revolved_slices
 from planner.kinematics.meridian import Meridian, tabulated
 
 Array = NDArray[np.float64]
