@@ -80,6 +80,20 @@ class ProfileBand:
         drawn = rng.multivariate_normal(self.mean, self.covariance, size=count, method="eigh")
         return np.maximum(drawn, 0.2 * np.max(self.mean))
 
+    def sample_about(self, x: Array, covariance: Array, *, rng: np.random.Generator) -> Array:
+        """The same for objects whose axes lie at x (count, 4) in the chart, drawn from `covariance`.
+
+        An axis that lies aside takes the wall along, so that every object goes through what was
+        touched: the band's own doubt is what is left of it for a known axis.
+        """
+        if self.by_axis is None:
+            return self.sample(len(x), rng=rng)
+        own = self.covariance - self.by_axis @ covariance @ self.by_axis.T
+        value, vector = np.linalg.eigh(0.5 * (own + own.T))
+        root = vector * np.sqrt(np.maximum(value, 0.0))
+        drawn = self.mean - x @ self.by_axis.T + rng.normal(size=(len(x), len(root))) @ root.T
+        return np.asarray(np.maximum(drawn, 0.2 * np.max(self.mean)))
+
     def _rows(self, z: Array) -> tuple[Array, Array, Array]:
         """r, r' and r'' at heights z (m,) as linear maps of the node radii, each (m, k)."""
         spline = CubicSpline(self.z, np.eye(len(self.z)), bc_type="natural")

@@ -107,16 +107,26 @@ def update(belief: Belief, touches: Iterable[Contact | Miss]) -> Belief:
 
 
 def sample_objects(belief: Belief, count: int, *, rng: np.random.Generator) -> SampledObjects:
-    """Objects the belief holds possible: hypotheses by their probability, bands by their width."""
+    """Objects the belief holds possible: hypotheses by their probability, bands by their width.
+
+    About the likeliest axis the profile errs with it (`ProfileBand.by_axis`); about others nobody
+    knows how.
+    """
     p = np.array([h.probability for h in belief.hypotheses])
     which = rng.choice(len(p), size=count, p=p / p.sum())
     points, directions = np.empty((count, 3)), np.empty((count, 3))
+    radii, band = np.empty((count, len(belief.band.z))), belief.band
     for i, hypothesis in enumerate(belief.hypotheses):
         mine = np.nonzero(which == i)[0]
         x = rng.multivariate_normal(np.zeros(4), hypothesis.covariance, size=len(mine))
         axis = hypothesis.axis
         points[mine], directions[mine] = chart_lines(axis.point, axis.direction, x)
-    return SampledObjects(points, directions, belief.band.z, belief.band.sample(count, rng=rng))
+        radii[mine] = (
+            band.sample_about(x, hypothesis.covariance, rng=rng)
+            if i == 0
+            else band.sample(len(mine), rng=rng)
+        )
+    return SampledObjects(points, directions, band.z, radii)
 
 
 def _with_sense(hypothesis: Hypothesis, reference: Axis) -> Hypothesis:

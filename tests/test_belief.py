@@ -9,7 +9,7 @@ from estimator.axis import Axis, angle_between, from_chart, offset_at, to_chart
 from estimator.belief import Belief, coarse_belief, sample_objects, update
 from estimator.contact import Miss
 from estimator.prior import AxisPrior, coarse_prior
-from estimator.profile import barrel, cone, cylinder
+from estimator.profile import SplineProfile, barrel, cone, cylinder
 from estimator.sensors import SENSORS
 from estimator.surface import Place, SurfaceOfRevolution
 from sim_sensor.noise import simulated_sensor
@@ -244,3 +244,31 @@ def test_a_prior_that_is_none_is_refused(field, value, message):
     good = {"axis": AXIS, "covariance": np.eye(4), "radius": 0.03, "radius_sd": 0.01}
     with pytest.raises(ValueError, match=message):
         AxisPrior(**(good | {field: value}))
+
+
+def test_objects_drawn_go_through_what_was_touched():
+    """Where the axis lies aside the wall does, too: drawn apart, walls miss the touched places.
+
+    Seen at the three places of twenty sessions: .54 mm against .88, half a millimetre is the
+    sensor's own.
+    """
+    apart, together = [], []
+    for seed in range(20):
+        rng = np.random.default_rng([seed, 11])
+        contacts = touches(barrel(0.033, 3.0, 0.1), rng=rng)
+        after = update(coarse(), contacts)
+        if after.hypotheses[0].probability < 0.95:
+            continue
+        told_apart = replace(after, band=replace(after.band, by_axis=None))
+        for belief, off in ((after, together), (told_apart, apart)):
+            drawn = sample_objects(belief, 200, rng=np.random.default_rng(seed))
+            p = np.array([contact.position for contact in contacts])
+            walls = zip(drawn.points, drawn.directions, drawn.radii, strict=True)
+            gaps = [
+                SurfaceOfRevolution(Axis(a, u), SplineProfile(drawn.z, r)).signed_distance(p)
+                for a, u, r in walls
+            ]
+            off.append(np.std(gaps, axis=0))
+    assert len(together) > 15
+    assert np.sqrt(np.mean(np.square(together))) < 0.65e-3
+    assert np.sqrt(np.mean(np.square(together))) < 0.7 * np.sqrt(np.mean(np.square(apart)))
