@@ -81,7 +81,7 @@ class ProfileBand:
         return np.maximum(drawn, 0.2 * np.max(self.mean))
 
     def sample_about(self, x: Array, covariance: Array, *, rng: np.random.Generator) -> Array:
-        """The same for objects whose axes lie at x (count, 4) in the chart, drawn from `covariance`.
+        """The same for objects whose axes lie at x (count, 4) in the chart, of this covariance.
 
         An axis that lies aside takes the wall along, so that every object goes through what was
         touched: the band's own doubt is what is left of it for a known axis.
