@@ -7,7 +7,7 @@ and any finger that feels something ends the motion.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +20,8 @@ from planner.motions.retreat import Retreat
 from planner.motions.timing import MotionLimits, timed
 from planner.motions.trajectory import Array, Configuration, Guard, Phase, Trajectory, between
 from planner.motions.transfer import Movable, Transfer, plan_transfer
+
+_Leave = tuple[Trajectory | None, list[MotionCertificate]]  # the way out, and what was measured
 
 OUTSIDE = 0.015  # from the believed object, at least, ends a way out [m]
 
@@ -66,28 +68,57 @@ def plan_round(
         ways: Out of the placement, the best first; the first that is clear is taken.
         start: Where the hand is; None to begin at the way in.
     """
+    leaves = ((way, _leave(movable, way)) for way in _ways(movable, ways))
+    first, reason = _first_clear(leaves)  # it costs least and is most often what is in the way
+    if first is None:
+        return reason or "no straight way out leads away from the object"
+    touches = _probes(movable, approaches, ways[0].q)
+    if isinstance(touches, str):
+        return touches
+    probes, certificates = touches
+    while first is not None:
+        way, (leave, found) = first
+        transfer = _come(movable, way, start)
+        if not isinstance(transfer, str):
+            if transfer.certificate is not None:
+                found.append(transfer.certificate)
+            enter = None if leave is None else _guarded_enter(movable, leave)
+            return RoundMotion(
+                transfer.trajectory, enter, probes, leave, way,
+                together([*certificates, *found]), transfer.sampled,
+            )  # fmt: skip
+        reason = reason or transfer
+        first, blocked = _first_clear(leaves)
+        reason = reason or blocked
+    return reason
+
+
+def _first_clear(
+    leaves: Iterable[tuple[Retreat, _Leave | str]],
+) -> tuple[tuple[Retreat, _Leave] | None, str]:
+    """The next way out with nothing in the way, and what was in the way of the first."""
+    reason = ""
+    for way, leave in leaves:
+        if not isinstance(leave, str):
+            return (way, leave), reason
+        reason = reason or leave
+    return None, reason
+
+
+def _probes(
+    movable: Movable, approaches: Sequence[Approach], q_begin: Array
+) -> tuple[tuple[tuple[Trajectory, Trajectory], ...], list[MotionCertificate]] | str:
+    """There and back along every approach, certified."""
     probes, certificates = [], []
     for approach in approaches:
-        pair = probe_motion(movable.hand, movable.limits, approach, ways[0].q)
+        pair = probe_motion(movable.hand, movable.limits, approach, q_begin)
         found = [movable.certify(one) for one in pair]
         faults = [fault for one in found for fault in one.faults]
         if faults:
             return f"{approach.finger}'s approach: {faults[0]}"
         probes.append(pair)
         certificates += found
-    reason = ""
-    for way in _ways(movable, ways):
-        outer = _outer(movable, way, start)
-        if isinstance(outer, str):
-            reason = reason or outer
-            continue
-        transfer, leave, found = outer
-        enter = None if leave is None else _guarded_enter(movable, leave)
-        return RoundMotion(
-            transfer.trajectory, enter, tuple(probes), leave, way,
-            together([*certificates, *found]), transfer.sampled,
-        )  # fmt: skip
-    return reason or "no straight way out leads away from the object"
+    return tuple(probes), certificates
 
 
 def _ways(movable: Movable, ways: Sequence[Retreat]) -> list[Retreat]:
@@ -167,25 +198,24 @@ def _base_at(approach: Approach, place: float) -> pin.SE3:
     return between(approach.bases[k], approach.bases[k + 1], np.array([place - k]))[0]
 
 
-def _outer(
-    movable: Movable, way: Retreat, start: Configuration | None
-) -> tuple[Transfer, Trajectory | None, list[MotionCertificate]] | str:
-    """The way to the object and the way out, certified."""
+def _leave(movable: Movable, way: Retreat) -> _Leave | str:
+    """The way out in time, certified; None where the hand stays."""
     leave = timed(
         movable.hand, "leave", way.path, way.bases, movable.limits, tips=_tips(movable.hand, way)
     )
     found = [] if leave is None else [movable.certify(leave)]
     if found and found[0].faults:
         return f"on the way out, {found[0].faults[0]}"
+    return leave, found
+
+
+def _come(movable: Movable, way: Retreat, start: Configuration | None) -> Transfer | str:
+    """The way to the object, where the way in begins."""
     if start is None:
-        return Transfer(None, None), leave, found
+        return Transfer(None, None)
     outside = Configuration(way.path[-1], way.bases[-1])
     transfer = plan_transfer(movable, start, outside, wanted=way.wanted)
-    if isinstance(transfer, str):
-        return f"on the way to the object, {transfer}"
-    if transfer.certificate is not None:
-        found.append(transfer.certificate)
-    return transfer, leave, found
+    return f"on the way to the object, {transfer}" if isinstance(transfer, str) else transfer
 
 
 def _tips(hand: Hand, way: Retreat) -> Array | None:
