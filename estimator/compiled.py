@@ -1,6 +1,6 @@
 """Functions compiled to machine code: the inner loops of the estimator.
 
-Compiled once a machine (a minute or two at the first plan), then loaded from the user's cache
+Compiled once a machine (a minute, see `planner.first_use`), then loaded from the user's cache
 folder: AXIS_BY_TOUCH_CACHE, else XDG_CACHE_HOME, else ~/.cache. numba renews a function only when
 its own file changes, although it holds the code of every function it calls; so the folder is named
 after all sources of this package and of the function's own.
@@ -57,6 +57,13 @@ def compiled_part(function: F) -> F:
     found._insert = lambda *_: None  # no code of it is entered from Python, there is no way in
     found._compile_for_args = partial(_refuse, function)
     return cast(F, found)
+
+
+def has_code(function: Callable[..., Any]) -> bool:
+    """Whether the cache holds machine code of a compiled function, for whatever arguments."""
+    found: Any = function
+    name = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}-*.nbi"
+    return any(Path(found._cache.cache_path).glob(name))
 
 
 def _refuse(function: Callable[..., Any], *_: Any, **__: Any) -> None:

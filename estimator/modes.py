@@ -63,12 +63,12 @@ def find_modes(problems: Problems) -> Modes:
         np.zeros((S, M), dtype=np.intp),
     )
     lines = complex_lines(problems.readings)
-    in_shares(lambda part: _fill(problems, lines, modes, part.start, part.stop), S)
+    in_shares(lambda part: fill_modes(problems, lines, modes, part.start, part.stop), S)
     return modes
 
 
 @compiled
-def _fill(problems: Problems, extra: Array, modes: Modes, first: int, end: int) -> None:
+def fill_modes(problems: Problems, extra: Array, modes: Modes, first: int, end: int) -> None:
     """Search, weigh and describe the sets from `first` to before `end`, one after the other."""
     n, D = problems.readings.shape[1], modes.x.shape[2]
     work = work_space(D - 2, n)

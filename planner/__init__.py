@@ -2,6 +2,7 @@
 
 from planner.carrying import Stop
 from planner.explore import Step, explore
+from planner.first_use import compile_ahead
 from planner.goal import Goal
 from planner.motions.surroundings import Box
 from planner.motions.timing import MotionLimits
@@ -25,6 +26,7 @@ __all__ = [
     "Stop",
     "Trajectory",
     "Workspace",
+    "compile_ahead",
     "explore",
     "plan_probes",
 ]

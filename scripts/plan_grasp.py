@@ -48,6 +48,7 @@ from estimator.surface import SurfaceOfRevolution
 from hand_models import HandError, load_hand
 from hand_models.hand import Hand
 from planner.explore import Step, explore
+from planner.first_use import compile_ahead
 from planner.goal import Goal
 from planner.grasping.grasp import GraspOptions
 from planner.hand_tools import require_room
@@ -62,7 +63,7 @@ if TYPE_CHECKING:
     from sim_sensor.physics.mujoco_world import MujocoWorld
 
 
-FIRST_TIME = "(the first time, compiling for a minute or two)"
+FIRST_TIME = "compiling, once on this machine: half a minute, a minute on one core ..."
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,8 +157,10 @@ def _rounds(scenario: Scenario, options: Options, console: Console) -> Iterator[
         rng=np.random.default_rng([options.seed, 1]),
         move=mover(scenario.world, options.sensor),
     )
+    with console.status(FIRST_TIME):
+        compile_ahead(scenario.hand, scenario.planner)
     while True:
-        with console.status(f"planning and touching {FIRST_TIME} ..."):
+        with console.status("planning and touching ..."):
             step = next(steps, None)
         if step is None:
             return
