@@ -85,21 +85,16 @@ class HandTools:
         assert root is not None  # of an arm
         bodies = [(body, 0.0) for body in fixed_bodies(self.rules.table, self.rules.boxes)]
         bodies.append((object_body(believed_solid(surface)), -INTRUSION))
-
         free = self.collision.among(bodies)
 
-        def met_by(q: Array) -> str | None:
-            if free.is_free(q, root):
-                return None
+        def words(q: Array) -> str:
             if not self.collision.is_self_free(q):
                 return "the arm folded into itself or the hand"
-            for body, least in bodies:
-                pair = self.collision.nearest_to(q, root, body)
-                if pair.distance < least:
-                    return f"{pair.first} in {body.name}"
-            return None
+            pairs = [(self.collision.nearest_to(q, root, body), least) for body, least in bodies]
+            pair, _ = min(pairs, key=lambda found: found[0].distance - found[1])
+            return f"{pair.first} in {pair.second}"
 
-        return met_by
+        return InTheWay(lambda q: free.is_free(q, root), words)
 
     def ways_out(self, belief: Belief, reach: Reach) -> tuple[Retreat, ...]:
         """Of the whole, from a reach's stand-off; a free hand's base is the reach's there."""

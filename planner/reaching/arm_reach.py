@@ -28,7 +28,12 @@ TURNS = 12  # of a placement about the object's axis
 POSTURES = 12  # of the arm that are solved for a placement, whichever way it is turned
 OUT_OF_REACH = "wrist out of the arm's reach"
 
-InTheWay = Callable[[Array], str | None]  # what a posture (nq,) meets, in words
+
+class InTheWay(NamedTuple):
+    """Whether a posture (nq,) of the whole is free, and what it meets in words if not."""
+
+    is_free: Callable[[Array], bool]
+    words: Callable[[Array], str]
 
 
 class _Brought(NamedTuple):
@@ -86,13 +91,12 @@ class ArmReach:
         self, brought: list[_Brought], q_hand: Array, in_the_way: InTheWay
     ) -> _Brought | str:
         """The first with nothing in its way, or what is in the first's way."""
-        faults = []
+        if not brought:
+            return OUT_OF_REACH
         for one in brought:
-            fault = in_the_way(self._arm.joined(one.q_arm, q_hand))
-            if fault is None:
+            if in_the_way.is_free(self._arm.joined(one.q_arm, q_hand)):
                 return one
-            faults.append(fault)
-        return faults[0] if faults else OUT_OF_REACH
+        return in_the_way.words(self._arm.joined(brought[0].q_arm, q_hand))
 
     def _brought(
         self, laid: Candidates, surface: SurfaceOfRevolution, room: Room

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from estimator.side_by_side import in_shares
 from estimator.surface import SurfaceOfRevolution
 from estimator.vectors import Array, Mask
 from hand_models.batch import batch_placements
@@ -80,9 +81,12 @@ def clear_turns(
     if room.is_empty:
         return np.ones(p_WB.shape[:2], dtype=np.bool_)
     local = spheres.positions(batch_placements(hand, q))
-    clear = [
-        room.distance(np.einsum("nij,nmj->nmi", R, local, optimize=True) + p[:, None])
-        > spheres.radii - INTRUSION
-        for R, p in zip(R_WB, p_WB, strict=True)
-    ]
-    return np.asarray(np.all(clear, axis=2))
+    clear = np.empty(p_WB.shape[:2], dtype=np.bool_)
+
+    def look(turns: slice) -> None:
+        for t in range(turns.start, turns.stop):
+            centres = np.einsum("nij,nmj->nmi", R_WB[t], local, optimize=True) + p_WB[t][:, None]
+            clear[t] = np.all(room.distance(centres) > spheres.radii - INTRUSION, axis=1)
+
+    in_shares(look, len(clear))
+    return clear
