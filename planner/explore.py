@@ -104,8 +104,8 @@ def explore(
     if budget < 1:
         raise ValueError(f"budget: expected at least one touch, got {budget}")
     options = options or PlannerOptions()
-    learnt, touches, asked = Learnt(belief, restless=options.give), 0, options.reach
-    sensor = replace(sensor, position=float(np.hypot(sensor.position, options.give)))
+    learnt, touches, asked = Learnt(belief, restless=options.slack), 0, options.reach
+    sensor = replace(sensor, position=float(np.hypot(sensor.position, options.slack)))
     while touches < budget and not (goal.met_by(learnt.belief) and learnt.settled):
         before = learnt.belief
         try:

@@ -37,8 +37,9 @@ class PlannerOptions:
             (`planner.choosing.sweep`); criterion `information` only.
         certify: Whether a plan says how good it is among all touches that there are.
         force_goal: At which a touching finger stops [N].
-        give: How far a touch may move the object, in each coordinate: of what stands and is not
-            held, a tenth of a millimetre or two [m]. Contacts count as so much worse placed.
+        slack: How far a contact may be from where a perfectly round object at rest would have it,
+            beside the sensor's noise, in each coordinate [m]: dents and seams, and touches that
+            move what stands and is not held. Of real things a tenth of a millimetre or two.
         start: Where the hand is; motions are planned from there (`planner.motions.round_motion`),
             and a placement that none leads to is refused. None plans no motions.
         limits: Of speed and acceleration.
@@ -56,7 +57,7 @@ class PlannerOptions:
     sweep: bool = False
     certify: bool = True
     force_goal: float = FORCE_GOAL
-    give: float = 0.0
+    slack: float = 0.0
     start: Configuration | None = None
     limits: MotionLimits = field(default_factory=MotionLimits)
 
@@ -68,8 +69,8 @@ class PlannerOptions:
             raise ValueError(f"criterion {self.criterion!r} is unknown; known are {known}")
         if not (np.isfinite(self.force_goal) and self.force_goal > 0.0):
             raise ValueError(f"force_goal: expected a force > 0 N, got {self.force_goal}")
-        if not (np.isfinite(self.give) and self.give >= 0.0):
-            raise ValueError(f"give: expected a length >= 0 m, got {self.give}")
+        if not (np.isfinite(self.slack) and self.slack >= 0.0):
+            raise ValueError(f"slack: expected a length >= 0 m, got {self.slack}")
         for name in ("placements", "objects", "tries"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name}: expected at least 1, got {getattr(self, name)}")

@@ -69,8 +69,8 @@ class Learnt:
         agreeing: Later touches that agreed with earlier ones, since the last that did not.
         surprise: What the last touches contradicted and what was done; None where nothing.
         surprises: How often that happened.
-        restless: By how much every contact counts as worse placed [m]: what gives way at a touch
-            moves a little each time, what keeps contradicting, more.
+        restless: By how much every contact counts as worse placed [m]: at first the slack that was
+            told of, more where contacts keep contradicting each other.
     """
 
     belief: Belief

@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 from grasp_moves import from_home, unconfirmed_by
-from worlds import build_world, mover, pose_in
+from worlds import SLACK, build_world, mover, pose_in
 
 from estimator.axis import angle_between, offset_at
 from estimator.band import ProfileBand
@@ -148,7 +148,7 @@ def carried_out(hand: str, world: World | MujocoWorld, belief: Belief, seed: int
     return explore(
         _hand(hand), touch, belief, sensor_noise(SENSOR), goal=GOAL, budget=BUDGET,
         rng=np.random.default_rng([seed, 1]), move=mover(world, SENSOR),
-        options=from_home(_hand(hand), PlannerOptions(certify=False)),
+        options=from_home(_hand(hand), PlannerOptions(certify=False, slack=SLACK)),
     )  # fmt: skip
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 from obstacle_file import read_obstacles
+from worlds import slack_in
 
 from planner.grasping.grasp import Friction, GraspOptions
 from planner.options import PlannerOptions
@@ -51,6 +52,9 @@ class Options:
     """How far from there, along each axis, it can go; it turns the hand any way."""
     obstacles: Path | None = None
     """A TOML file of a table and boxes that the hand must not meet (scripts/obstacle_file.py)."""
+    slack_mm: float | None = None
+    """How far a contact may be from where a perfectly round object at rest would have it, beside
+    the sensor's noise. Not given, 0.2 for real objects, raw signals and MuJoCo, and else 0."""
     budget: int = 15
     """Largest number of touches."""
     grasp_heights_mm: tuple[float, float] | None = None
@@ -72,6 +76,8 @@ def require_sane(options: Options) -> None:
         raise ValueError(f"--prior-offset-mm: expected 0 to 1000, got {options.prior_offset_mm}")
     if options.budget < 1:
         raise ValueError(f"--budget: expected at least one touch, got {options.budget}")
+    if options.slack_mm is not None and not 0.0 <= options.slack_mm < 10.0:
+        raise ValueError(f"--slack-mm: expected 0 to 10, got {options.slack_mm}")
     if options.seed < 0:
         raise ValueError(f"--seed: expected a number >= 0, got {options.seed}")
 
@@ -79,13 +85,16 @@ def require_sane(options: Options) -> None:
 def planner_options(options: Options) -> PlannerOptions:
     """The planner's defaults, within the arm's workspace, among the obstacles."""
     reach = replace(PlannerOptions().reach, **read_obstacles(options.obstacles))
+    slack = slack_in(options.world, options.sensor, options.object)
+    if options.slack_mm is not None:
+        slack = 1e-3 * options.slack_mm
     if options.wrist_mm is None:
-        return PlannerOptions(reach=reach)
+        return PlannerOptions(reach=reach, slack=slack)
     if not np.all(np.isfinite(options.wrist_mm)):
         raise ValueError(f"--wrist-mm: expected three finite numbers, got {options.wrist_mm}")
     X_WB = pin.SE3(np.eye(3), 1e-3 * np.array(options.wrist_mm))
     workspace = Workspace(X_WB, 1e-3 * options.wrist_range_mm, np.pi)
-    return PlannerOptions(reach=replace(reach, workspace=workspace))
+    return PlannerOptions(reach=replace(reach, workspace=workspace), slack=slack)
 
 
 def grasp_options(options: Options, told: ReachOptions) -> GraspOptions:

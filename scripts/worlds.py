@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from sim_sensor.physics.mujoco_world import MujocoWorld
 
 WORLDS = ("own", "mujoco", "mujoco-table")
-GIVE = 0.2e-3  # how far a touch moves what stands on a table [m]
+SLACK = 0.2e-3  # of real things, of raw signals, and of what a touch moves on a table [m]
 _DEFAULT, _OF_MUJOCO = "gel", "gel-depth"
 
 
@@ -50,6 +50,12 @@ def sensor_in(world: str, sensor: str) -> str:
     if sensor not in (_DEFAULT, _OF_MUJOCO):
         raise ValueError(f"--world {world}: its pads are {_OF_MUJOCO}, not --sensor {sensor}")
     return _OF_MUJOCO
+
+
+def slack_in(world: str, sensor: str, name: str) -> float:
+    """How far contacts may be from where a perfectly round object at rest would have them [m]."""
+    real = Path(name).suffix.lower() in (".json", *SUFFIXES)
+    return SLACK if real or world != "own" or sensor in RAW_SENSORS else 0.0
 
 
 def pose_in(world: str, rng: np.random.Generator) -> Axis:
@@ -82,7 +88,7 @@ def build_world(
 def among_what_stands(
     world: str, surface: SurfaceOfRevolution, options: PlannerOptions
 ) -> PlannerOptions:
-    """The planner's options with the table that the object stands on, and how a touch moves it."""
+    """The planner's options with the table that the object stands on."""
     if world != "mujoco-table":
         return options
     from sim_sensor.physics.mujoco_object import BOARD_SIZE, board
@@ -90,7 +96,7 @@ def among_what_stands(
     centre = board(surface)
     table = Box((centre[0], centre[1], centre[2]), BOARD_SIZE, name="the table")
     reach = replace(options.reach, boxes=(*options.reach.boxes, table))
-    return replace(options, reach=reach, give=GIVE)
+    return replace(options, reach=reach)
 
 
 def mover(world: World | MujocoWorld, sensor: str) -> Move | None:

@@ -17,7 +17,7 @@ import mujoco
 from commands import script
 from grasp_moves import from_home
 from mujoco_sessions import exact_belief
-from worlds import among_what_stands, mover, sensor_in
+from worlds import SLACK, among_what_stands, mover, sensor_in
 
 from estimator.axis import Axis, angle_between, offset_at
 from estimator.contact import Contact, Miss
@@ -240,7 +240,7 @@ def pushed_session(seed: int) -> tuple[list[Step], SurfaceOfRevolution, float]:
     surface, rng = surface_of("can", UPRIGHT), np.random.default_rng(seed)
     world = MujocoWorld(HAND, surface, rng=rng, standing=Standing())
     belief = coarse_view(surface, angle=np.deg2rad(15.0), offset=0.015, rng=rng)
-    options = from_home(HAND, PlannerOptions(placements=600, certify=False))
+    options = from_home(HAND, PlannerOptions(placements=600, certify=False, slack=SLACK))
     options = among_what_stands("mujoco-table", surface, options)
     pushed: list[float] = []
 
@@ -261,7 +261,7 @@ def pushed_session(seed: int) -> tuple[list[Step], SurfaceOfRevolution, float]:
 
 def test_an_object_that_was_pushed_is_noticed_and_found_where_it_is_now() -> None:
     """Eight cans on their table. Each touch moves one by a tenth of a millimetre or two, which the
-    planner is told of (`give`): told nothing, it takes that for a motion in one session of six."""
+    planner is told of (`slack`): told nothing, it takes that for a motion in one session of six."""
     moved, surprises = 0, 0
     for seed in range(1, 9):
         steps, surface, pushed = pushed_session(seed)

@@ -95,6 +95,7 @@ def test_a_sphere_is_never_claimed_to_be_known(tmp_path):
         (("--prior-angle-deg", "120"), "--prior-angle-deg: expected 0 to 90"),
         (("--prior-offset-mm", "nan"), "--prior-offset-mm: expected 0 to 1000"),
         (("--budget", "0"), "--budget: expected at least one touch"),
+        (("--slack-mm", "-1"), "--slack-mm: expected 0 to 10, got -1.0"),
         (("--prior-offset-mm", "1e300"), "--prior-offset-mm: expected 0 to 1000"),
         (("--seed", "-1"), "--seed: expected a number >= 0"),
         (("--view", "guess"), "is unknown; known are pose, cloud, box"),
