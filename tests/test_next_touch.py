@@ -126,7 +126,7 @@ def test_a_touch_is_gentle_and_has_a_way_out():
 
 
 def test_a_force_that_is_none_and_a_slack_below_none_are_refused():
-    with pytest.raises(ValueError, match="slack: expected a length >= 0 m, got -0.001"):
+    with pytest.raises(ValueError, match="slack: expected a length >= 0 m"):
         PlannerOptions(slack=-1e-3)
     with pytest.raises(ValueError, match="force_goal: expected a force > 0 N, got 0"):
         PlannerOptions(force_goal=0.0)
