@@ -57,22 +57,19 @@ class Among:
     """A hand among bodies: whether it is free of itself and keeps away from each.
 
     Args:
-        bodies: Each with how far away from it shapes that meet objects have to be [m].
-        roots: Shapes that never move, and so cannot meet what is still.
+        bodies: Each with the shapes that may meet it, and how far away they have to be [m].
     """
 
     def __init__(
         self,
         hand: Hand,
         shapes: CollisionShapes,
-        bodies: Iterable[tuple[Body, float]],
-        roots: Iterable[int] = (),
+        bodies: Iterable[tuple[Body, Sequence[int], float]],
     ) -> None:
-        every, fixed = shapes.model.copy(), set(roots)
+        every = shapes.model.copy()
         margins = [0.0] * len(every.collisionPairs)
         self._parts: list[tuple[pin.GeometryObject, pin.SE3]] = []
-        for body, margin in bodies:
-            met_by = [i for i in shapes.outer if not (body.still and i in fixed)]
+        for body, met_by, margin in bodies:
             for part in body.parts:
                 name = f"{body.name} {every.ngeoms}"
                 shape = pin.GeometryObject(name, 0, 0, body.X_WO, part)

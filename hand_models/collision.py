@@ -84,7 +84,8 @@ class HandCollision:
 
     def among(self, bodies: Iterable[tuple[Body, float]]) -> Among:
         """The same together with bodies, each with how far to keep away from it [m]."""
-        return Among(self.hand, self.shapes, bodies, self._roots)
+        told = ((body, self.meeting(body), margin) for body, margin in bodies)
+        return Among(self.hand, self.shapes, told)
 
     def self_collisions(self, q: ArrayLike, *, nearer_than: float = 0.0) -> tuple[LinkPair, ...]:
         """Pairs of links nearer to each other than that, nearest first [m]."""

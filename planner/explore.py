@@ -150,7 +150,8 @@ def _plan(
     belief = learnt.belief
     few = replace(options, tries=min(options.tries, TELLING_TRIES))
     if goal.met_by(belief):
-        return next_touch(hand, belief, sensor, goal=goal, rng=rng, options=few)
+        with suppress(NoPlan):  # where no single touch confirms it, a placement may
+            return next_touch(hand, belief, sensor, goal=goal, rng=rng, options=few)
     if _ambiguous(belief) and options.criterion == "information":
         with suppress(NoPlan):
             return next_touch(hand, belief, sensor, goal=goal, rng=rng, options=few)

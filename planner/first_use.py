@@ -1,6 +1,6 @@
 """The first plan on a machine: what it needs is compiled by two processes, in half the time of one.
 
-Without this the first plan compiles by itself, and takes a minute and a half for it.
+Half a minute on two cores; without this the first plan compiles by itself, in a minute and a half.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from estimator.prior import coarse_prior
 from hand_models.hand import Hand
 from planner.choosing.prospects import prospects
 from planner.hand_tools import hand_tools
+from planner.kinematics.pulling import pull
 from planner.motions.motion import plan_approaches
 from planner.options import PlannerOptions
 from planner.reaching.reach import Reach
@@ -29,22 +30,31 @@ from planner.reaching.starts import Start
 def compile_ahead(hand: Hand, options: PlannerOptions | None = None) -> None:
     """Compile what a plan needs, if this machine has not done so before.
 
-    What is compiled is kept in the user's cache (`estimator.compiled`). The other process runs this
-    Python; where it cannot, the first plan compiles the rest.
+    What is compiled is kept in the user's cache (`estimator.compiled`). The other process is
+    `sys.executable`, which has to be a Python; without one this process compiles its own half, and
+    the first plan the rest.
     """
-    if has_code(modes.fill_modes):
+    if has_code(modes.fill_modes) and has_code(pull):
         return
-    path = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
-    other = subprocess.Popen(
-        [sys.executable, "-m", first_use.__name__],
-        env=dict(os.environ, PYTHONPATH=path),
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
+    other = _other_process()
     try:
         compile_kinematics(hand, options or PlannerOptions())
     finally:
-        other.wait()
+        if other is not None:
+            other.wait()
+
+
+def _other_process() -> subprocess.Popen[bytes] | None:
+    path = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
+    try:
+        return subprocess.Popen(
+            [sys.executable, "-m", first_use.__name__],
+            env=dict(os.environ, PYTHONPATH=path),
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+    except (OSError, TypeError):
+        return None
 
 
 def compile_kinematics(hand: Hand, options: PlannerOptions) -> None:

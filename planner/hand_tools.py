@@ -80,7 +80,7 @@ class HandTools:
         return self.arm.placements(laid, surface, room, self._in_the_way(surface))
 
     def _in_the_way(self, surface: SurfaceOfRevolution) -> InTheWay:
-        """Says what hand and arm meet in a posture; the object coarsely, as reach goes on."""
+        """What hand and arm meet in a posture; the object coarsely, as reach goes on."""
         root = self.rules.workspace.X_WB
         assert root is not None  # of an arm
         bodies = [(body, 0.0) for body in fixed_bodies(self.rules.table, self.rules.boxes)]

@@ -40,6 +40,7 @@ class PlannerOptions:
         slack: How far a contact may be from where a perfectly round object at rest would have it,
             beside the sensor's noise, in each coordinate [m]: dents and seams, and touches that
             move what stands and is not held. Of real things a tenth of a millimetre or two.
+            `explore` reckons with it; who plans single placements adds it to the sensor's noise.
         start: Where the hand is; motions are planned from there (`planner.motions.round_motion`),
             and a placement that none leads to is refused. None plans no motions.
         limits: Of speed and acceleration.

@@ -25,6 +25,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
+from worlds import SLACK
 
 from estimator.axis import Axis, angle_between, offset_at, to_chart
 from estimator.belief import Belief
@@ -36,6 +37,7 @@ from hand_models import load_hand
 from hand_models.hand import Hand
 from planner.explore import explore
 from planner.goal import Goal
+from planner.options import PlannerOptions
 from planner.plan import NoPlan, Probe
 from sim_sensor.camera import coarse_view
 from sim_sensor.noise import simulated_sensor
@@ -148,9 +150,10 @@ def run_session(
     raw = sensor in RAW_SENSORS and not readings
     mounted = raw_sense(sensor, surface, rng=rng) if raw else None
     world = World(surface, mounted or simulated_sensor(sensor).session(rng=rng), rng=rng)
-    touches, why = 0, ""
+    touches, why, slack = 0, "", SLACK if raw else 0.0
+    steps = _beliefs(_hand(hand), world, belief, sensor, budget, seed, slack)
     try:
-        for after, touches in _beliefs(_hand(hand), world, belief, sensor, budget, seed):  # noqa: B007
+        for after, touches in steps:  # noqa: B007
             belief = after
     except NoPlan as error:
         why = str(error)
@@ -158,7 +161,7 @@ def run_session(
 
 
 def _beliefs(
-    hand: Hand, world: World, belief: Belief, sensor: str, budget: int, seed: int
+    hand: Hand, world: World, belief: Belief, sensor: str, budget: int, seed: int, slack: float
 ) -> Iterator[tuple[Belief, int]]:
     """The belief after each placement, and the touches so far."""
 
@@ -171,6 +174,7 @@ def _beliefs(
     steps = explore(
         hand, touch, belief, sensor_noise(sensor),
         goal=GOAL, budget=budget, rng=np.random.default_rng([seed, 12]),
+        options=PlannerOptions(slack=slack),
     )  # fmt: skip
     for step in steps:
         yield step.after, step.touches

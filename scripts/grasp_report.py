@@ -154,27 +154,29 @@ def episode_of(
         paced = [None] * len(step.plan.probes) if motions is None else motions(step, own)
         if step.stop is not None and not step.felt:
             acts.append(_link_stop(step, step.stop, paced[0]))
-        belief = step.before
-        for (finger, outcome), (path, bases), record, motion in zip(
-            step.felt, _ways(step), own, paced[: len(own)], strict=True
-        ):
-            after = update(belief, [outcome])
+        beliefs = [step.before, *_after_each(step)]
+        for j, (path, bases) in enumerate(_ways(step)):
+            finger, outcome = step.felt[j]
+            before, after = (BelievedAxis(b.axis, b.covariance) for b in beliefs[j : j + 2])
+            felt = own[j].felt
+            note = "" if felt is None else "; ".join(felt.flags)
             acts.append(
                 Act(
-                    finger=finger,
-                    path=path,
-                    bases=bases,
-                    stop=record.stop,
-                    outcome=outcome,
-                    before=BelievedAxis(belief.axis, belief.covariance),
-                    after=BelievedAxis(after.axis, after.covariance),
-                    note="" if record.felt is None else "; ".join(record.felt.flags),
-                    signal=_shown(sensor, record.felt),
-                    motion=motion,
+                    finger, path, bases, own[j].stop, outcome, before, after, note,
+                    _shown(sensor, felt), paced[j],
                 )
-            )
-            belief = after
+            )  # fmt: skip
     return Episode(surface, tuple(acts), conclusion=conclusion, grip=grip, room=room)
+
+
+def _after_each(step: Step) -> list[Belief]:
+    """The belief after each touch of a step, contacts as they counted in the session."""
+    counted = iter(step.after.contacts[-sum(isinstance(o, Contact) for _, o in step.felt) :])
+    beliefs, belief = [], step.before
+    for _, outcome in step.felt[:-1]:
+        belief = update(belief, [next(counted) if isinstance(outcome, Contact) else outcome])
+        beliefs.append(belief)
+    return [*beliefs, step.after] if step.felt else []
 
 
 def _link_stop(step: Step, stop: Stop, motion: ActMotion | None) -> Act:

@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 from grasp_moves import from_home, unconfirmed_by
-from worlds import SLACK, build_world, mover, pose_in
+from worlds import SLACK, among_what_stands, build_world, mover, pose_in
 
 from estimator.axis import angle_between, offset_at
 from estimator.band import ProfileBand
@@ -124,7 +124,7 @@ def session(hand: str, name: str, seed: int, world: str, *, mass: float = 0.3) -
     steps: list[Step] = []
     reason = ""
     try:
-        for step in carried_out(hand, here, belief, seed):
+        for step in carried_out(hand, here, belief, seed, kind=world):
             steps.append(step)
     except NoPlan as error:
         reason = str(error)
@@ -136,8 +136,16 @@ def _plan(hand: str, surface: SurfaceOfRevolution, rng: np.random.Generator) -> 
     return plan_probes(_hand(hand), belief, sensor_noise(SENSOR), goal=GOAL, rng=rng)
 
 
-def carried_out(hand: str, world: World | MujocoWorld, belief: Belief, seed: int) -> Iterator[Step]:
-    """A session with the default goal; where the world can, every motion is carried out."""
+def carried_out(
+    hand: str, world: World | MujocoWorld, belief: Belief, seed: int, *, kind: str = "mujoco"
+) -> Iterator[Step]:
+    """A session with the default goal; where the world can, every motion is carried out.
+
+    Args:
+        kind: Of the world: on a table, that is told of.
+    """
+    options = from_home(_hand(hand), PlannerOptions(certify=False, slack=SLACK))
+    options = among_what_stands(kind, world.surface, options)
 
     def touch(probe: Probe) -> Contact | Miss:
         felt = world.touch(probe.approach, finger_axis_W=probe.approach.finger_axis)
@@ -148,7 +156,7 @@ def carried_out(hand: str, world: World | MujocoWorld, belief: Belief, seed: int
     return explore(
         _hand(hand), touch, belief, sensor_noise(SENSOR), goal=GOAL, budget=BUDGET,
         rng=np.random.default_rng([seed, 1]), move=mover(world, SENSOR),
-        options=from_home(_hand(hand), PlannerOptions(certify=False, slack=SLACK)),
+        options=options,
     )  # fmt: skip
 
 

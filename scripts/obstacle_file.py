@@ -23,7 +23,7 @@ from planner.motions.surroundings import Box
 from planner.reaching.reach_task import ReachOptions
 from sim_sensor.viewer.episode import Block
 
-BOARD = (0.8, 0.8, 0.01)  # of a table, as it is shown [m]
+SHOWN_TABLE = (0.8, 0.8, 0.01)  # a table is shown as a board of this size [m]
 TABLE, BOX = {"table_mm", "box"}, {"name", "centre_mm", "size_mm", "yaw_deg"}
 
 
@@ -56,10 +56,10 @@ def blocks(reach: ReachOptions, object_W: Array) -> tuple[Block, ...]:
     shown = [Block(box.pose, np.array(box.size)) for box in reach.boxes]
     if reach.table is not None:
         n, height = np.array(reach.table[:3]), reach.table[3]
-        below = object_W - (object_W @ n - height + 0.5 * BOARD[2]) * n
+        below = object_W - (object_W @ n - height + 0.5 * SHOWN_TABLE[2]) * n
         across = basis_across(n)
         R = np.column_stack([across[0], across[1], n])
-        shown.append(Block(pin.SE3(R, below), np.array(BOARD)))
+        shown.append(Block(pin.SE3(R, below), np.array(SHOWN_TABLE)))
     return tuple(shown)
 
 

@@ -63,7 +63,7 @@ if TYPE_CHECKING:
     from sim_sensor.physics.mujoco_world import MujocoWorld
 
 
-FIRST_TIME = "compiling, once on this machine: half a minute, a minute on one core ..."
+FIRST_TIME = "looking for compiled code; the first time half a minute or more ..."
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,6 +117,7 @@ def _scenario(options: Options) -> Scenario:
             f"--wrist-mm: {hand.name} is held by its arm; its description says where that stands"
         )
     planner = from_home(hand, planner_options(options))
+    planner = among_what_stands(options.world, surface, planner)
     require_room(hand, planner.reach)
     belief = belief_by(
         options.view,
@@ -126,7 +127,6 @@ def _scenario(options: Options) -> Scenario:
         rng=rng,
     )
     world = build_world(options.world, hand, surface, options.sensor, rng)
-    planner = among_what_stands(options.world, surface, planner)
     return Scenario(
         surface=surface,
         belief=belief,

@@ -88,11 +88,17 @@ def build_world(
 def among_what_stands(
     world: str, surface: SurfaceOfRevolution, options: PlannerOptions
 ) -> PlannerOptions:
-    """The planner's options with the table that the object stands on."""
+    """The planner's options with the table that the object stands on.
+
+    Raises:
+        ValueError: MuJoCo is not installed.
+    """
     if world != "mujoco-table":
         return options
-    from sim_sensor.physics.mujoco_object import BOARD_SIZE, board
-
+    try:
+        from sim_sensor.physics.mujoco_object import BOARD_SIZE, board
+    except ImportError as error:
+        raise ValueError(f"--world {world}: needs the extra 'mujoco' ({error})") from None
     centre = board(surface)
     table = Box((centre[0], centre[1], centre[2]), BOARD_SIZE, name="the table")
     reach = replace(options.reach, boxes=(*options.reach.boxes, table))

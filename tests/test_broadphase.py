@@ -36,7 +36,8 @@ def drawn(hand, rng):
     if hand.arm is not None:
         return q, hand.arm.X_WA
     place = np.array([0.5, 0.0, 0.15]) + rng.uniform(-0.25, 0.25, 3)
-    return q, pin.SE3(pin.SE3.Random().rotation, place)
+    turn = rng.normal(size=4)
+    return q, pin.SE3(pin.Quaternion(*turn / np.linalg.norm(turn)).matrix(), place)
 
 
 def every_distance(collision, q):
@@ -56,7 +57,7 @@ def every_distance(collision, q):
 
 
 def test_the_nearest_links_are_those_of_all_pairs(collision):
-    """80 postures; near and far, so that every band of margins and none of them is asked."""
+    """80 postures, near and far: of the Allegro's more than one band of margins is asked."""
     rng, bands = np.random.default_rng(4), set()
     for _ in range(80):
         q, _ = drawn(collision.hand, rng)
@@ -127,3 +128,17 @@ def test_a_body_that_counts_nowhere_is_not_near(collision):
     told = around(collision)
     q, X_WB = drawn(collision.hand, np.random.default_rng(8))
     assert nearest_on_way(collision, q[None], [X_WB], told.object, [None]) is None
+
+
+def test_two_boxes_of_one_name_are_both_looked_at():
+    """However they are listed; they have a default name, and an obstacle file may repeat one."""
+    collision = HandCollision(load_hand("allegro_right"))
+    surface = SurfaceOfRevolution(Axis([0.5, 0.0, 0.15], [0.0, 0.0, 1.0]), load_object("bottle"))
+    solid, q = believed_solid(surface), collision.hand.home
+    X_WB = pin.SE3(np.eye(3), np.array([1.0, 0.0, 1.0]))
+    inside, far = Box((1.0, 0.0, 1.0), (0.1, 0.1, 0.1)), Box((4.0, 0.0, 1.0), (0.1, 0.1, 0.1))
+    assert inside.name == far.name
+    for boxes in ((inside, far), (far, inside)):
+        told = surroundings(collision, solid, None, boxes)
+        assert told.nearest(q[None], [X_WB], [()])[inside.name].distance < 0.0
+        assert not told.keeping(0.0).is_free(q, X_WB)

@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from obstacle_file import BOARD, blocks, read_obstacles
+from obstacle_file import SHOWN_TABLE, blocks, read_obstacles
 
 from planner.motions.surroundings import Box
 from planner.reaching.reach_task import ReachOptions
@@ -70,7 +70,7 @@ def test_the_page_shows_a_table_below_the_object_and_every_box(tmp_path):
     shown_box, board = blocks(ReachOptions(boxes=(box,), table=(*n, 0.03)), object_W)
     np.testing.assert_array_equal(shown_box.X_WC.homogeneous, box.pose.homogeneous)
     np.testing.assert_array_equal(shown_box.size, box.size)
-    face = board.X_WC.translation + 0.5 * BOARD[2] * board.X_WC.rotation[:, 2]
+    face = board.X_WC.translation + 0.5 * SHOWN_TABLE[2] * board.X_WC.rotation[:, 2]
     np.testing.assert_allclose(board.X_WC.rotation[:, 2], n, atol=1e-12)
     assert face @ n == pytest.approx(0.03, abs=1e-12)
     np.testing.assert_allclose(np.cross(object_W - face, n), 0.0, atol=1e-12)

@@ -9,7 +9,7 @@ import numpy as np
 
 from hand_models.collision import LinkPair
 from hand_models.hand import Hand
-from planner.motions.surroundings import OBJECT, ROOM, Surroundings
+from planner.motions.surroundings import OBJECT, ROOM, Surroundings, smallest
 from planner.motions.timing import MotionLimits
 from planner.motions.trajectory import Array, Trajectory
 from planner.reaching.certificate import gap_in_words
@@ -83,7 +83,7 @@ def together(certificates: Iterable[MotionCertificate]) -> MotionCertificate:
     """The worst of several, each kind of pair for itself."""
     every = list(certificates)
     tight = min(every, key=lambda one: one.limit_margin)
-    nearest = _smallest(item for one in every for item in one.nearest.items())
+    nearest = smallest(item for one in every for item in one.nearest.items())
     return MotionCertificate(
         sum(one.waypoints for one in every), tight.limit_margin, tight.limit_joint,
         max(one.speed for one in every), max(one.acceleration for one in every),
@@ -98,14 +98,6 @@ def _nearest(around: Surroundings, trajectory: Trajectory) -> dict[str, LinkPair
     last = np.inf if guard is None or guard.expected is None else guard.expected + _ROUNDING
     touching = [trajectory.touching if time <= last else None for time in trajectory.times]
     return around.nearest(trajectory.q, trajectory.bases, touching)
-
-
-def _smallest(found: Iterable[tuple[str, LinkPair]]) -> dict[str, LinkPair]:
-    nearest: dict[str, LinkPair] = {}
-    for thing, pair in found:
-        if thing not in nearest or pair.distance < nearest[thing].distance:
-            nearest[thing] = pair
-    return nearest
 
 
 def _shares(hand: Hand, trajectory: Trajectory, limits: MotionLimits) -> tuple[float, float]:

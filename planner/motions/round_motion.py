@@ -7,7 +7,7 @@ and any finger that feels something ends the motion.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,9 +21,11 @@ from planner.motions.timing import MotionLimits, timed
 from planner.motions.trajectory import Array, Configuration, Guard, Phase, Trajectory, between
 from planner.motions.transfer import Movable, Transfer, plan_transfer
 
-_Leave = tuple[Trajectory | None, list[MotionCertificate]]  # the way out, and what was measured
-
 OUTSIDE = 0.015  # from the believed object, at least, ends a way out [m]
+
+# The way out, and approaches with ways back, each with what was measured.
+_Left = tuple[Trajectory | None, list[MotionCertificate]]
+_Probes = tuple[tuple[tuple[Trajectory, Trajectory], ...], list[MotionCertificate]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,46 +70,36 @@ def plan_round(
         ways: Out of the placement, the best first; the first that is clear is taken.
         start: Where the hand is; None to begin at the way in.
     """
-    leaves = ((way, _leave(movable, way)) for way in _ways(movable, ways))
-    first, reason = _first_clear(leaves)  # it costs least and is most often what is in the way
-    if first is None:
-        return reason or "no straight way out leads away from the object"
-    touches = _probes(movable, approaches, ways[0].q)
-    if isinstance(touches, str):
-        return touches
-    probes, certificates = touches
-    while first is not None:
-        way, (leave, found) = first
+    reason, probes = "", None
+    for way in _ways(movable, ways):
+        left = _leave(movable, way)  # first: it costs least and is most often what is in the way
+        if isinstance(left, str):
+            reason = reason or left
+            continue
+        probes = probes or _probes(movable, approaches, ways[0].q)
+        if isinstance(probes, str):
+            return probes
         transfer = _come(movable, way, start)
-        if not isinstance(transfer, str):
-            if transfer.certificate is not None:
-                found.append(transfer.certificate)
-            enter = None if leave is None else _guarded_enter(movable, leave)
-            return RoundMotion(
-                transfer.trajectory, enter, probes, leave, way,
-                together([*certificates, *found]), transfer.sampled,
-            )  # fmt: skip
-        reason = reason or transfer
-        first, blocked = _first_clear(leaves)
-        reason = reason or blocked
-    return reason
+        if isinstance(transfer, str):
+            reason = reason or transfer
+            continue
+        return _round(movable, way, left, probes, transfer)
+    return reason or "no straight way out leads away from the object"
 
 
-def _first_clear(
-    leaves: Iterable[tuple[Retreat, _Leave | str]],
-) -> tuple[tuple[Retreat, _Leave] | None, str]:
-    """The next way out with nothing in the way, and what was in the way of the first."""
-    reason = ""
-    for way, leave in leaves:
-        if not isinstance(leave, str):
-            return (way, leave), reason
-        reason = reason or leave
-    return None, reason
+def _round(
+    movable: Movable, way: Retreat, left: _Left, probes: _Probes, transfer: Transfer
+) -> RoundMotion:
+    leave, found = left
+    touches, certificates = probes
+    came = [] if transfer.certificate is None else [transfer.certificate]
+    return RoundMotion(
+        transfer.trajectory, None if leave is None else _guarded_enter(movable, leave), touches,
+        leave, way, together([*certificates, *found, *came]), transfer.sampled,
+    )  # fmt: skip
 
 
-def _probes(
-    movable: Movable, approaches: Sequence[Approach], q_begin: Array
-) -> tuple[tuple[tuple[Trajectory, Trajectory], ...], list[MotionCertificate]] | str:
+def _probes(movable: Movable, approaches: Sequence[Approach], q_begin: Array) -> _Probes | str:
     """There and back along every approach, certified."""
     probes, certificates = [], []
     for approach in approaches:
@@ -198,7 +190,7 @@ def _base_at(approach: Approach, place: float) -> pin.SE3:
     return between(approach.bases[k], approach.bases[k + 1], np.array([place - k]))[0]
 
 
-def _leave(movable: Movable, way: Retreat) -> _Leave | str:
+def _leave(movable: Movable, way: Retreat) -> _Left | str:
     """The way out in time, certified; None where the hand stays."""
     leave = timed(
         movable.hand, "leave", way.path, way.bases, movable.limits, tips=_tips(movable.hand, way)

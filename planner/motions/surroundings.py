@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import coal
@@ -90,13 +90,22 @@ class Surroundings:
             touching: At each, fingers whose pads may touch the object; None if it does not count.
         """
         moved = np.append(True, np.any(np.diff(q, axis=0) != 0.0, axis=1))
-        found = {ITSELF: self.collision.nearest_links(q[moved])}
+        found = [(ITSELF, self.collision.nearest_links(q[moved]))]
         nobody: list[Collection[str]] = [()] * len(q)
         for body, those in [*((body, nobody) for body in self.fixed), (self.object, touching)]:
             pair = nearest_on_way(self.collision, q, bases, body, those)
             if pair is not None:
-                found[body.name] = pair
-        return found
+                found.append((body.name, pair))
+        return smallest(found)
+
+
+def smallest(found: Iterable[tuple[str, LinkPair]]) -> dict[str, LinkPair]:
+    """The nearest pair of each name: two boxes may have one."""
+    nearest: dict[str, LinkPair] = {}
+    for thing, pair in found:
+        if thing not in nearest or pair.distance < nearest[thing].distance:
+            nearest[thing] = pair
+    return nearest
 
 
 def surroundings(

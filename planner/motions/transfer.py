@@ -18,7 +18,7 @@ from hand_models.collision import HandCollision
 from hand_models.hand import Hand
 from planner.motions.motion_certificate import MotionCertificate, certify_motion
 from planner.motions.sampled_path import sampled_path
-from planner.motions.surroundings import ITSELF, OBJECT, ROOM, Surroundings, surroundings
+from planner.motions.surroundings import ITSELF, OBJECT, ROOM, Surroundings, smallest, surroundings
 from planner.motions.timing import MotionLimits, timed
 from planner.motions.trajectory import Array, Configuration, Trajectory, between
 from planner.reaching.certificate import gap_in_words
@@ -100,7 +100,7 @@ def plan_transfer(
     """
     margin = wanted
     for word, place in (("where it starts", begin), ("where it ends", end)):
-        near = dict(movable.around.pairs(place.q, place.X_WB))
+        near = smallest(movable.around.pairs(place.q, place.X_WB))
         margin = min(margin, near.pop(OBJECT).distance - _SLACK)
         for thing, pair in near.items():
             if pair.distance < (0.0 if thing == ITSELF else ROOM):

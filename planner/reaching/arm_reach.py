@@ -57,7 +57,7 @@ class ArmReach:
         Args:
             surface: On which they are laid, and about whose axis they may be turned.
             room: What stands about it.
-            in_the_way: Says what a posture of the whole meets.
+            in_the_way: Whether a posture of the whole is free, and what it meets.
         """
         if len(laid) == 0:
             return self._whole(laid, [], [], laid.rejected)

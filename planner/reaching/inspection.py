@@ -125,7 +125,7 @@ def _pressing_faults(
             q = found.q_standoff.copy()
             q[joints] = (1.0 - share) * found.q[joints] + share * found.q_overshoot[joints]
             if options.self_clearance <= 0.0 and collision.is_self_free(q):
-                continue  # four times faster than the distance
+                continue  # much faster than the distance
             pair = collision.self_clearance(q)
             if pair.distance < options.self_clearance:
                 yield f"{name} beyond its contact: {gap_in_words(pair)}"

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from estimator.vectors import Array, frozen, unit
-from sim_sensor.physics.mujoco_object import OBJECT, TABLE
+from sim_sensor.physics.mujoco_object import BOARD, OBJECT, TABLE
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,3 +49,14 @@ def touching_object(model: mujoco.MjModel, data: mujoco.MjData) -> dict[str, Fel
         name: Felt(force, deepest[name][1] if name in deepest else None)
         for name, force in forces.items()
     }
+
+
+def on_board(model: mujoco.MjModel, data: mujoco.MjData) -> set[str]:
+    """Names of the hand's geoms that touch the table's board."""
+    found = set[str]()
+    for k in range(data.ncon):
+        contact = data.contact[k]
+        names = {model.geom(g).name for g in contact.geom}
+        if contact.dist <= 0.0 and BOARD in names:
+            found |= names - {BOARD}
+    return found

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from estimator.contact import Contact
 from estimator.vectors import Array, frozen
 from hand_models.hand import Hand
-from sim_sensor.physics.mujoco_contact import NOTHING, touching_object
+from sim_sensor.physics.mujoco_contact import NOTHING, on_board, touching_object
 from sim_sensor.physics.mujoco_hand import joint_targets, link_name, pad_name
 from sim_sensor.physics.mujoco_press import Press, Tick, set_joints, settle, step
 
@@ -65,7 +65,7 @@ class Followed:
     Args:
         time: When it ended [s].
         ended: Whether something ended it before its time.
-        bumped: Links and pads that met the object.
+        bumped: Links and pads that met the object or its table.
         lag: Largest distance of a joint from its target [rad].
         finger: Whose pad ended it; empty where none did.
         press: Of that pad; None where a link ended it, or nothing.
@@ -92,7 +92,7 @@ def follow(model: mujoco.MjModel, data: mujoco.MjData, hand: Hand, way: Timed) -
     for at, tick in enumerate(route):
         touching = step(model, data, tick)
         lag = max(lag, *(abs(float(j.qpos[0]) - t) for j, t in zip(joints, tick.q, strict=True)))
-        bumped |= {link_name(name) for name in touching}
+        bumped |= {link_name(name) for name in (*touching, *on_board(model, data))}
         if way.phase != "leave" and any(felt.force >= force for felt in touching.values()):
             pad = max(pads, key=lambda name: touching.get(name, NOTHING).force)
             felt = touching.get(pad, NOTHING)

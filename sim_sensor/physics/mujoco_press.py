@@ -12,7 +12,7 @@ import pinocchio as pin
 
 from estimator.vectors import Array, frozen, unit
 from hand_models.hand import Hand
-from sim_sensor.physics.mujoco_contact import NOTHING, Felt, touching_object
+from sim_sensor.physics.mujoco_contact import NOTHING, Felt, on_board, touching_object
 from sim_sensor.physics.mujoco_hand import joint_targets, link_name, pad_name, place_base
 
 SPEED, BACK = 0.03, 0.15  # of the pad on its way and back [m/s]
@@ -57,7 +57,7 @@ class Press:
         rests: Where on the object it rests at last; None if it does not.
         force: On the pad [N].
         reached: Whether that is the force asked for.
-        bumped: What else met the object on the way.
+        bumped: What else met the object on the way, or its table.
         overlap: How far the start had to be taken back [m].
     """
 
@@ -90,7 +90,7 @@ def press(model: mujoco.MjModel, data: mujoco.MjData, hand: Hand, way: Touching)
         at += 1
         touching = step(model, data, route[at])
         felt = touching.pop(pad, NOTHING)
-        bumped |= {link_name(name) for name in touching}
+        bumped |= {link_name(name) for name in (*touching, *on_board(model, data))}
         met = felt.met if met is None else met
     reached = felt.force >= way.force_goal
     at = settle(model, data, route, at, pad, way.force_goal)

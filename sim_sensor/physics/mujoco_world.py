@@ -49,7 +49,7 @@ class MujocoRecord(TouchRecord):
     Args:
         met: Where on the object the pad first met it, (3,); None after a miss.
         force: On the pad when it stopped [N].
-        bumped: Links and other pads that met the object on the way.
+        bumped: Links and other pads that met the object on the way, or its table.
         moved: How far this touch moved the object [m].
         reached: Whether the pad was pressed with the force asked for.
     """
