@@ -1,7 +1,9 @@
 """Which shapes meet, through a tree of their boxes: ten times faster than asking every pair.
 
 Pinocchio moves the shapes, coal's dynamic tree finds pairs whose boxes overlap, and only those are
-asked exactly, each from scratch (`start_afresh`). Boxes are widened by the pairs' margins.
+asked, each from scratch (`start_afresh`). Boxes are widened by the pairs' margins. Without a margin
+one random posture in 6 000 with an overlap of a millimetre or two passes for free: a quick look for
+who searches, while what is certified goes by distances.
 """
 
 from __future__ import annotations

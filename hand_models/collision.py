@@ -73,14 +73,14 @@ class HandCollision:
         start_afresh(self._shape_data)
         self._geometries = [shape.geometry for shape in self._shapes.geometryObjects]
         self._roots = _roots(hand, self._shapes)
-        pairs = len(self._shapes.collisionPairs)
-        self._meeting = ShapeTree(hand.model, self._shapes, [0.0] * pairs)
         self._trees: dict[int, ShapeTree] = {}
         self._placed: tuple[Array, list[coal.Transform3s]] | None = None
 
     def is_self_free(self, q: ArrayLike) -> bool:
         """Whether no two links overlap; stops at the first that do."""
-        return not self._meeting.meets(q)
+        return not pin.computeCollisions(
+            self.hand.model, self._data, self._shapes, self._shape_data, np.asarray(q), True
+        )
 
     def among(self, bodies: Iterable[tuple[Body, float]]) -> Among:
         """The same together with bodies, each with how far to keep away from it [m]."""

@@ -52,6 +52,8 @@ def plan_on(name: str, direction: tuple[float, ...]) -> Plan:
     """Three touches planned by somebody who knows the object."""
     belief = exact_belief(surface_of(name, list(direction)))
     options = PlannerOptions(placements=600)
+    if list(direction) == UPRIGHT:  # on its table
+        options = among_what_stands("mujoco-table", surface_of(name, UPRIGHT), options)
     rng = np.random.default_rng(0)
     return plan_probes(HAND, belief, sensor_noise("gel-depth"), goal=GOAL, rng=rng, options=options)
 
