@@ -65,21 +65,19 @@ class HandCollision:
 
     def __init__(self, hand: Hand) -> None:
         self.hand = hand
-        shapes = shapes_of(hand)
-        self.shapes, self._shapes, self._pad_ids = shapes, shapes.model, shapes.pads
-        self._outer = shapes.outer
+        self.shapes = shapes_of(hand)
         self._data = hand.model.createData()
-        self._shape_data = pin.GeometryData(self._shapes)
+        self._shape_data = pin.GeometryData(self.shapes.model)
         start_afresh(self._shape_data)
-        self._geometries = [shape.geometry for shape in self._shapes.geometryObjects]
-        self._roots = _roots(hand, self._shapes)
+        self._geometries = [shape.geometry for shape in self.shapes.model.geometryObjects]
+        self._roots = _roots(hand, self.shapes.model)
         self._trees: dict[int, ShapeTree] = {}
         self._placed: tuple[Array, list[coal.Transform3s]] | None = None
 
     def is_self_free(self, q: ArrayLike) -> bool:
         """Whether no two links overlap; stops at the first that do."""
         return not pin.computeCollisions(
-            self.hand.model, self._data, self._shapes, self._shape_data, np.asarray(q), True
+            self.hand.model, self._data, self.shapes.model, self._shape_data, np.asarray(q), True
         )
 
     def among(self, bodies: Iterable[tuple[Body, float]]) -> Among:
@@ -131,10 +129,10 @@ class HandCollision:
             X_WO: Pose of the object.
         """
         placed, there = self._placements(q), as_coal(X_WB.inverse() * X_WO)
-        links = [i for i in self._outer if i not in self._pad_ids]
+        links = [i for i in self.shapes.outer if i not in self.shapes.pads]
         distances, pads = (
             np.array([distance_from(self._geometries[i], placed[i], slices, there) for i in ids])
-            for ids in (links, self._pad_ids)
+            for ids in (links, self.shapes.pads)
         )
         return ObjectClearance(tuple(self._link(i) for i in links), distances, pads)
 
@@ -169,11 +167,11 @@ class HandCollision:
 
     def meeting(self, body: Body) -> list[int]:
         """Shapes that may meet a body: an arm's root cannot, where both are still."""
-        return [i for i in self._outer if not (body.still and i in self._roots)]
+        return [i for i in self.shapes.outer if not (body.still and i in self._roots)]
 
     def pads_of(self, fingers: Collection[str]) -> set[int]:
         """The shapes that are these fingers' pads."""
-        pads = zip(self._pad_ids, self.hand.fingers, strict=True)
+        pads = zip(self.shapes.pads, self.hand.fingers, strict=True)
         return {i for i, finger in pads if finger.name in fingers}
 
     def root_in(self, body: Body) -> LinkPair | None:
@@ -193,35 +191,35 @@ class HandCollision:
         q = np.array(q, dtype=np.float64)
         if self._placed is None or not np.array_equal(q, self._placed[0]):
             pin.updateGeometryPlacements(
-                self.hand.model, self._data, self._shapes, self._shape_data, q
+                self.hand.model, self._data, self.shapes.model, self._shape_data, q
             )
             self._placed = (q, [as_coal(X) for X in self._shape_data.oMg])
         return self._placed[1]
 
     def _near(self, k: int) -> ShapeTree:
         if k not in self._trees:
-            margins = [NEAR[k]] * len(self._shapes.collisionPairs)
-            self._trees[k] = ShapeTree(self.hand.model, self._shapes, margins)
+            margins = [NEAR[k]] * len(self.shapes.model.collisionPairs)
+            self._trees[k] = ShapeTree(self.hand.model, self.shapes.model, margins)
         return self._trees[k]
 
     def _self_distances(self, q: ArrayLike) -> Array:
         pin.computeDistances(
-            self.hand.model, self._data, self._shapes, self._shape_data, np.asarray(q)
+            self.hand.model, self._data, self.shapes.model, self._shape_data, np.asarray(q)
         )
         return np.array([result.min_distance for result in self._shape_data.distanceResults])
 
     def _named(self, pair: int, distance: float) -> LinkPair:
-        ids = self._shapes.collisionPairs[pair]
+        ids = self.shapes.model.collisionPairs[pair]
         return LinkPair(self._link(int(ids.first)), self._link(int(ids.second)), distance)
 
     def part(self, shape: int) -> str:
         """A pad by its finger, another shape by its link."""
-        if shape in self._pad_ids:
-            return f"the pad of {self.hand.fingers[self._pad_ids.index(shape)].name}"
+        if shape in self.shapes.pads:
+            return f"the pad of {self.hand.fingers[self.shapes.pads.index(shape)].name}"
         return self._link(shape)
 
     def _link(self, shape: int) -> str:
-        frame = self._shapes.geometryObjects[shape].parentFrame
+        frame = self.shapes.model.geometryObjects[shape].parentFrame
         return str(self.hand.model.frames[frame].name)
 
 

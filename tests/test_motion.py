@@ -75,7 +75,7 @@ def test_each_motion_begins_where_the_one_before_it_ended(trajectories):
     for before, after in pairwise(trajectories):
         if after.phase == "withdraw":
             touch = before.until(before.guard.expected)
-            assert near(touch.end, after.begin, turn=3e-5)
+            assert near(touch.end, after.begin, turn=1e-5)
         else:
             assert near(before.end, after.begin)
 
