@@ -51,6 +51,7 @@ def hand_fingerprint(hand: Hand, *settings: object) -> str:
         digest.update(np.ascontiguousarray(vertices(shape.geometry)).tobytes())
     for finger in hand.fingers:
         pad = (*finger.pad_centre.tolist(), *finger.pad_normal.tolist(), finger.pad_radius)
+        pad += tuple(finger.dome.axes.ravel().tolist())
         digest.update(repr((finger.name, finger.tip_frame, finger.joints, pad)).encode())
     digest.update(repr(settings).encode())
     return digest.hexdigest()[:24]

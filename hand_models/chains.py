@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hand_models.geometry import pad_in_joint
+from hand_models.geometry import dome_in_joint, pad_in_joint
 from hand_models.hand import Hand
 from hand_models.joints import joint_motions
 
@@ -30,7 +30,9 @@ class Chains(NamedTuple):
         q_indices, multipliers, offsets: (J,) joint j stands at multiplier q[q_index] + offset.
         lower, upper: (nq,) limits.
         pad_joints, pad_centres, pad_normals, pad_radii: (F,), (F, 3), (F, 3), (F,) in the joints'
-            frames [m].
+            frames: spheres that stand for the pads [m].
+        dome_centres, dome_spreads, dome_radii: (F, 3), (F, 3, 3), (F,) c and A of the pads'
+            surfaces (`hand_models.dome`) in the joints' frames, and rho less `pad_radii` [m].
         supports: (F, L) joints between base and pad, filled up with -1.
     """
 
@@ -48,6 +50,9 @@ class Chains(NamedTuple):
     pad_centres: Array
     pad_normals: Array
     pad_radii: Array
+    dome_centres: Array
+    dome_spreads: Array
+    dome_radii: Array
     supports: IntArray
 
 
@@ -57,7 +62,7 @@ def chains_of(hand: Hand) -> Chains:
     model, motions = hand.model, joint_motions(hand.model)
     placements = list(model.jointPlacements)
     joints, centres, normals = zip(*(pad_in_joint(hand, f) for f in hand.fingers), strict=True)
-    nothing = np.zeros(3)
+    domes, nothing = [dome_in_joint(hand, f) for f in hand.fingers], np.zeros(3)
     return Chains(
         parents=np.array([int(i) for i in model.parents]),
         rotations=np.array([X.rotation for X in placements]),
@@ -73,6 +78,11 @@ def chains_of(hand: Hand) -> Chains:
         pad_centres=np.array(centres),
         pad_normals=np.array(normals),
         pad_radii=np.array([f.pad_radius for f in hand.fingers]),
+        dome_centres=np.array([dome.centre for dome in domes]),
+        dome_spreads=np.array([dome.spread for dome in domes]),
+        dome_radii=np.array(
+            [dome.radius - f.pad_radius for dome, f in zip(domes, hand.fingers, strict=True)]
+        ),
         supports=_supports(hand, joints),
     )
 

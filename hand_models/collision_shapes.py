@@ -11,22 +11,23 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from hand_models.geometry import link_points, pad_in_joint
+from hand_models.geometry import dome_in_joint, link_points, pad_in_joint
 from hand_models.hand import Finger, Hand, HandError
 
 Array = NDArray[np.float64]
 
+_ON_DOME = 1.5e-4  # points of a tip so far out of its dome are the dome's own [m]
 _HULL_OPTIONS = "Qt"  # qhull must triangulate, or coal cuts faces of more than three corners short
 
 
 class CollisionShapes:
-    """Hulls and pad spheres as one geometry model, and which of them meet what.
+    """Hulls and pads as one geometry model, and which of them meet what.
 
     Attributes:
         model: All shapes.
         outer: Ids of those that meet objects.
-        inner: Ids of those that meet other links; of a pad whose link shows no mesh, its sphere.
-        pads: Ids of the pads' spheres.
+        inner: Ids of those that meet other links; of a pad whose link shows no mesh, itself.
+        pads: Ids of the pads.
     """
 
     def __init__(self, hand: Hand) -> None:
@@ -58,10 +59,11 @@ class CollisionShapes:
         return [_add(self.model, name, visual.parentJoint, visual.parentFrame, convex_hull(points))]
 
     def _add_pad(self, hand: Hand, finger: Finger, *, shown: bool) -> None:
-        joint, centre, _ = pad_in_joint(hand, finger)
-        at = pin.SE3(np.eye(3), centre)
-        sphere = coal.Sphere(finger.pad_radius)
-        pad = _add(self.model, f"pad of {finger.name}", joint, finger.tip_frame_id, sphere, at)
+        joint, dome = pad_in_joint(hand, finger)[0], dome_in_joint(hand, finger)
+        ball = dome.is_sphere
+        at = pin.SE3(np.eye(3), dome.centre if ball else np.zeros(3))
+        shape = coal.Sphere(dome.radius) if ball else convex_hull(dome.points)
+        pad = _add(self.model, f"pad of {finger.name}", joint, finger.tip_frame_id, shape, at)
         self.outer.append(pad)
         self.pads.append(pad)
         if not shown:
@@ -78,9 +80,13 @@ def _inside_pads(hand: Hand, joint: int, points: Array) -> NDArray[np.bool_]:
     """(N,) which of a joint's points lie in a pad's sphere."""
     inside = np.zeros(len(points), dtype=np.bool_)
     for finger in hand.fingers:
-        at, centre, _ = pad_in_joint(hand, finger)
-        if at == joint:
-            inside |= np.linalg.norm(points - centre, axis=1) <= 1.01 * finger.pad_radius
+        dome = dome_in_joint(hand, finger)
+        if pad_in_joint(hand, finger)[0] != joint:
+            continue
+        if dome.is_sphere:
+            inside |= np.linalg.norm(points - dome.centre, axis=1) <= 1.01 * dome.radius
+        else:
+            inside |= dome.holds(points, _ON_DOME)
     return inside
 
 

@@ -30,12 +30,13 @@ from hand_models.fields import (
     text,
     unit_vector,
     vector,
+    vectors,
 )
 from hand_models.sources import SOURCE_KEYS, SourceDescription, read_source
 
 _HAND_KEYS = {*SOURCE_KEYS, "name", "copies", "arm", "wrist", "fingers"}
 _COPY_KEYS = {"prefix", "position", "rotation_deg"}
-_FINGER_KEYS = {"name", "tip_frame", "pad_centre", "pad_normal", "pad_radius"}
+_FINGER_KEYS = {"name", "tip_frame", "pad_centre", "pad_normal", "pad_radius", "pad_axes"}
 
 
 @dataclass(frozen=True)
@@ -45,9 +46,10 @@ class FingerDescription:
     Attributes:
         name: Unique among the hand's fingers.
         tip_frame: Name of the link that carries the pad.
-        pad_centre: Centre of the pad's sphere, in T [m].
+        pad_centre: Middle of the pad, of its sphere if it is one, in T [m].
         pad_normal: Unit vector out of the pad, in T.
-        pad_radius: Radius of the pad's sphere [m].
+        pad_radius: Radius of the pad's sphere, or of the ball that is rolled over its axes [m].
+        pad_axes: Half axes, in T [m]; none for a sphere (`hand_models.dome`).
     """
 
     name: str
@@ -55,6 +57,7 @@ class FingerDescription:
     pad_centre: Vector
     pad_normal: Vector
     pad_radius: float
+    pad_axes: tuple[Vector, ...]
 
 
 @dataclass(frozen=True)
@@ -185,4 +188,5 @@ def _finger(table: Mapping[str, Any], where: str) -> FingerDescription:
         pad_centre=vector(table, "pad_centre", where),
         pad_normal=unit_vector(table, "pad_normal", where),
         pad_radius=positive(table, "pad_radius", where),
+        pad_axes=vectors(table, "pad_axes", where, most=3),
     )

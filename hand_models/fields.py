@@ -50,6 +50,14 @@ def vector(table: Mapping[str, Any], key: str, where: str, default: Vector | Non
     return x, y, z
 
 
+def vectors(table: Mapping[str, Any], key: str, where: str, *, most: int) -> tuple[Vector, ...]:
+    """A list of at most so many vectors; none if it is not given."""
+    value = table.get(key, [])
+    if not isinstance(value, list) or len(value) > most:
+        raise HandError(f"{where}: {key} must be a list of at most {most} vectors, got {value!r}")
+    return tuple(vector({key: one}, key, where) for one in value)
+
+
 def unit_vector(table: Mapping[str, Any], key: str, where: str) -> Vector:
     x, y, z = vector(table, key, where)
     length = math.hypot(x, y, z)

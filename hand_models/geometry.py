@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from hand_models.dome import Dome
 from hand_models.fields import HandError
 
 if TYPE_CHECKING:
@@ -65,6 +66,13 @@ def pad_in_joint(hand: Hand, finger: Finger) -> tuple[int, Array, Array]:
         np.asarray(X_JT.act(finger.pad_centre)),
         np.asarray(X_JT.rotation @ finger.pad_normal),
     )
+
+
+def dome_in_joint(hand: Hand, finger: Finger) -> Dome:
+    """A pad's surface in the frame of the joint that moves it."""
+    X_JT: pin.SE3 = hand.model.frames[finger.tip_frame_id].placement
+    dome = finger.dome
+    return Dome(np.asarray(X_JT.act(dome.centre)), dome.radius, dome.axes @ X_JT.rotation.T)
 
 
 def _circle_points() -> Array:

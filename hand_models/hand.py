@@ -1,9 +1,10 @@
 """Hands that feel: a Pinocchio model with pads on its fingertips, and a hand in a configuration.
 
 Frames: W world, B hand base (Pinocchio's universe), T fingertip (the link `Finger.tip_frame`).
-A pad is a sphere fixed in T with an outward normal through the middle of its sensitive patch. A
-pad that touches a smooth surface at p with outward surface normal n has its centre at
-p + pad_radius * n, and its normal within the sensor's cone about -n.
+A pad is a convex surface fixed in T (`Dome`: a sphere, a cylinder, a dome) with an outward normal
+through the middle of its sensitive patch. A pad that touches a smooth surface at p with outward
+surface normal n has there the ball of its radius centred at p + pad_radius * n, and its normal
+within the sensor's cone about -n.
 """
 
 from __future__ import annotations
@@ -21,7 +22,9 @@ from hand_models.arm import Arm
 from hand_models.assembly import assembled, mounted, placed
 from hand_models.carriers import ArmDescription, WristDescription
 from hand_models.description import FingerDescription, known_hands, read_description
+from hand_models.dome import Dome
 from hand_models.fields import HandError
+from hand_models.finger import Finger
 from hand_models.joints import joint_motions
 from hand_models.part import Coupling, Part, coupled, link_id
 from hand_models.pose import HandPose
@@ -32,32 +35,6 @@ __all__ = ["Finger", "Hand", "HandError", "HandPose", "known_hands", "load_hand"
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-
-
-@dataclass(frozen=True, eq=False)
-class Finger:
-    """A finger and the pad on its tip.
-
-    Attributes:
-        name: E.g. "index".
-        joints: Names of the independent joints that move the tip, from base to tip; of a joint
-            that follows another, the one that drives it.
-        q_indices: (J,) their indices into q, in the same order.
-        tip_frame: Name of the link that carries the pad; its frame is T.
-        tip_frame_id: Its index into `model.frames`.
-        pad_centre: (3,) centre of the pad's sphere, in T [m].
-        pad_normal: (3,) unit vector out of the pad, in T.
-        pad_radius: Radius of the pad's sphere [m].
-    """
-
-    name: str
-    joints: tuple[str, ...]
-    q_indices: IntArray
-    tip_frame: str
-    tip_frame_id: int
-    pad_centre: Array
-    pad_normal: Array
-    pad_radius: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +104,19 @@ class Hand:
         if self.arm is None:
             return self.middle
         return _frozen(self.arm.joined(self.arm.home, self.arm.hand.middle))
+
+    @property
+    def has_balls(self) -> bool:
+        """Whether all its pads are spheres."""
+        return all(finger.dome.is_sphere for finger in self.fingers)
+
+    def with_balls(self) -> Hand:
+        """The same hand, its pads replaced by the spheres that stand for them from afar."""
+        if self.has_balls:
+            return self
+        arm = self.arm and replace(self.arm, hand=self.arm.hand.with_balls())
+        fingers = tuple(finger.with_ball() for finger in self.fingers)
+        return replace(self, fingers=fingers, arm=arm)
 
     def finger(self, name: str) -> Finger:
         """The finger of that name.
@@ -266,9 +256,12 @@ def _finger(model: pin.Model, description: FingerDescription) -> Finger:
         q_indices=_frozen_indices(list(drivers)),
         tip_frame=description.tip_frame,
         tip_frame_id=tip_frame_id,
-        pad_centre=_frozen(description.pad_centre),
+        dome=Dome(
+            _frozen(description.pad_centre),
+            description.pad_radius,
+            _frozen(np.reshape(description.pad_axes, (-1, 3))),
+        ),
         pad_normal=_frozen(description.pad_normal),
-        pad_radius=description.pad_radius,
     )
 
 

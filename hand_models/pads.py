@@ -1,9 +1,10 @@
 """Measure a fingertip's pad from its mesh, and guess which way it looks.
 
-A convex tip touches a plane of inward normal u at height h(u) = max p . u over its points p, and a
-sphere of centre c and radius r does so at c . u + r. The pad is the sphere whose heights are those
-of the tip for all u within a cone about the pad's normal: a linear least squares problem. What is
-left over is how far a contact in that cone is misplaced along its normal by taking the sphere.
+A convex tip touches a plane of inward normal u at height h(u) = max p . u over its points p. A
+sphere of centre c and radius r does so at c . u + r: the one whose heights are those of the tip for
+all u within a cone about the pad's normal is a linear least squares problem. Where it leaves too
+much, a ball rolled over an ellipsoid (`hand_models.dome`) is fitted the same way, which is not
+linear. What is left over is how far a contact in that cone is misplaced along its normal.
 """
 
 from __future__ import annotations
@@ -16,8 +17,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from hand_models.dome import CONE, Dome, directions_about, nearest_sphere
+from hand_models.dome_fit import fit_dome
 from hand_models.fields import HandError
-from hand_models.geometry import pad_in_joint, points_moved_by, vertices
+from hand_models.geometry import points_moved_by, vertices
 from hand_models.joints import joint_motion
 from hand_models.part import Part
 
@@ -26,10 +29,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-CONE = float(np.radians(40.0))
 TILTS = tuple(np.radians([30.0, 45.0, 60.0, 90.0]))  # from the palm side towards the finger's end
-GOOD = 1.2e-3  # misfit of a pad [m]
-SMALLEST, LARGEST = 3e-3, 25e-3  # radii of pads [m]
+GOOD = 1.2e-3  # misfit of a sphere: a patch of the tip that can be a pad [m]
+EXACT = 1.5e-4  # ... beyond which the pad is no sphere [m]
 _DIRECTIONS = 400
 _LOPSIDED = 0.1  # share of its range by which a joint must bend farther one way
 
@@ -39,15 +41,13 @@ class PadFit:
     """A pad in the frame of its link.
 
     Attributes:
-        centre: (3,) of the sphere [m].
+        dome: Its surface.
         normal: (3,) unit vector out of it.
-        radius: Of the sphere [m].
-        misfit: Root mean square of tip less sphere over the cone, along the normals [m].
+        misfit: Root mean square of tip less pad over the cone, along the normals [m].
     """
 
-    centre: Array
+    dome: Dome
     normal: Array
-    radius: float
     misfit: float
 
 
@@ -59,45 +59,47 @@ def fit_pad(points: Array, normal: Array, *, cone: float = CONE) -> PadFit:
         normal: (3,) unit vector out of the middle of the pad.
         cone: About it [rad]; the sphere's radius is the worse determined the smaller it is.
     """
-    u = _cap(normal, cone)
+    u = directions_about(normal, cone, _DIRECTIONS)
     heights = (points @ u.T).max(axis=0)
-    rows = np.column_stack([u, np.ones(len(u))])
-    *centre, radius = np.linalg.lstsq(rows, heights, rcond=None)[0]
-    bounded = float(np.clip(radius, SMALLEST, LARGEST))
-    if bounded != radius:  # a flat or pointed tip: the best sphere of a radius that can be planned
-        centre = np.linalg.lstsq(u, heights - bounded, rcond=None)[0]
-    misfit = heights - u @ np.asarray(centre) - bounded
-    return PadFit(np.asarray(centre), normal, bounded, float(np.sqrt(np.mean(misfit**2))))
+    sphere = Dome(*nearest_sphere(u, heights), np.zeros((0, 3)))
+    return PadFit(sphere, normal, _misfit(sphere, u, heights))
+
+
+def refined(fit: PadFit, points: Array, *, cone: float = CONE) -> PadFit:
+    """A fitted sphere as the dome that does better, where one is called for."""
+    if fit.misfit < EXACT:
+        return fit
+    u = directions_about(fit.normal, cone, _DIRECTIONS)
+    heights = (points @ u.T).max(axis=0)
+    dome = fit_dome(u, heights, fit.dome)
+    better = PadFit(dome, fit.normal, _misfit(dome, u, heights))
+    return better if better.misfit < fit.misfit else fit
+
+
+def _misfit(pad: Dome, u: Array, heights: Array) -> float:
+    return float(np.sqrt(np.mean((heights - pad.heights(u)) ** 2)))
 
 
 @lru_cache(maxsize=32)
 def pad_bulges(hand: Hand, cone: float) -> Array:
-    """How far each tip's mesh stands out of its pad's sphere where it touches, (F,) [m].
+    """How far each tip's mesh stands out of its pad's surface where it touches, (F,) [m].
 
-    A touch along a normal u begins so much before the sphere's does; zero where the sphere is
-    foremost, or where a tip has no mesh.
+    A touch along a normal u begins so much before the pad's does; zero where the pad is foremost,
+    or where a tip has no mesh.
 
     Args:
         cone: Largest angle between u and the pad's normal [rad].
     """
     out = np.zeros(len(hand.fingers))
     for i, finger in enumerate(hand.fingers):
-        joint, centre, normal = pad_in_joint(hand, finger)
-        points, u = points_moved_by(hand, joint), _cap(normal, cone)
+        frame = hand.model.frames[finger.tip_frame_id]
+        points = points_moved_by(hand, int(frame.parentJoint))
         if len(points):
-            out[i] = max(np.max((points @ u.T).max(axis=0) - u @ centre) - finger.pad_radius, 0.0)
+            in_tip = (points - frame.placement.translation) @ frame.placement.rotation
+            u = directions_about(finger.pad_normal, cone, _DIRECTIONS)
+            out[i] = max(np.max((in_tip @ u.T).max(axis=0) - finger.dome.heights(u)), 0.0)
     out.setflags(write=False)
     return out
-
-
-def _cap(normal: Array, cone: float) -> Array:
-    """(M, 3) unit vectors spread evenly over the cap within a cone about the normal."""
-    k = np.arange(_DIRECTIONS) + 0.5
-    z = 1.0 - (1.0 - np.cos(cone)) * k / _DIRECTIONS
-    turn = np.pi * (1.0 + np.sqrt(5.0)) * k  # the golden angle
-    across = np.linalg.svd(normal[None])[2][1:]
-    circle = np.cos(turn)[:, None] * across[0] + np.sin(turn)[:, None] * across[1]
-    return np.asarray(np.sqrt(1.0 - z**2)[:, None] * circle + z[:, None] * normal)
 
 
 def tip_points(part: Part, frame: int) -> Array:
@@ -121,7 +123,7 @@ def tip_points(part: Part, frame: int) -> Array:
 
 
 def measure_pad(part: Part, frame: int, *, towards: Array | None = None) -> PadFit:
-    """The pad of a fingertip: its normal guessed from how the finger bends, its sphere fitted.
+    """The pad of a fingertip: its normal guessed from how the finger bends, its surface fitted.
 
     The last joint that moves the link closes the finger towards the farther of its limits, or,
     where it bends both ways alike or slides, towards the other fingertips. The pad looks that way,
@@ -146,7 +148,7 @@ def measure_pad(part: Part, frame: int, *, towards: Array | None = None) -> PadF
     tilts = (0.0,) if np.any(linear) else TILTS
     fits = [fit_pad(points, np.cos(t) * across + np.sin(t) * distal) for t in tilts]
     good = [fit for fit in fits if fit.misfit < GOOD]
-    return good[0] if good else min(fits, key=lambda fit: fit.misfit)
+    return refined(good[0] if good else min(fits, key=lambda fit: fit.misfit), points)
 
 
 def _last_joint(part: Part, frame: int) -> tuple[Array, Array, Array]:

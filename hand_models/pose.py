@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -41,7 +42,7 @@ class HandPose:
 
     @cached_property
     def pad_centres(self) -> Array:
-        """(F, 3) centres of the pads' spheres in the world, in the order of the fingers [m]."""
+        """(F, 3) centres of the spheres that stand for the pads, in the world [m]."""
         fingers = self.hand.fingers
         return _frozen([self.transform_tip_to_world(f).act(f.pad_centre) for f in fingers])
 
@@ -50,6 +51,17 @@ class HandPose:
         """(F, 3) unit vectors out of the pads in the world, in the order of the fingers."""
         fingers = self.hand.fingers
         return _frozen([self.transform_tip_to_world(f).rotation @ f.pad_normal for f in fingers])
+
+    def ball_centres(self, fingers: Sequence[int], normals: ArrayLike) -> Array:
+        """(k, 3) centres in the world of the balls of the pads' radii that touch surfaces of the
+        given outward normals (k, 3) exactly where the pads do [m]: p + pad_radius * n at a contact.
+        Those of `pad_centres` where pads are spheres."""
+        out = []
+        for row, n in zip(fingers, np.asarray(normals, dtype=np.float64), strict=True):
+            finger = self.hand.fingers[row]
+            X_WT = self.transform_tip_to_world(finger)
+            out.append(X_WT.act(finger.ball_along(-X_WT.rotation.T @ n)))
+        return _frozen(out)
 
     def link_axis(self, finger: Finger) -> Array:
         """(3,) unit vector along the finger's last link in the world: from its last joint to the

@@ -74,7 +74,7 @@ def propose_description(file: Path, *, base: str | None = None) -> Proposal:
     for name, tip, other in zip(names, tips, towards, strict=True):
         fit = measure_pad(part, tip, towards=other)
         if fit.misfit > GOOD:
-            doubts.append(f"{name}: no sphere fits the tip better than {1e3 * fit.misfit:.1f} mm")
+            doubts.append(f"{name}: no pad fits the tip better than {1e3 * fit.misfit:.1f} mm")
         tables.append(_table(name, part.model.frames[tip].name, fit))
     head = _head(file, folders[0], base)
     return Proposal("\n".join([head, *tables]), base, names, tuple(doubts))
@@ -170,9 +170,14 @@ def _head(file: Path, folder: Path, base: str) -> str:
 
 
 def _table(name: str, link: str, fit: PadFit) -> str:
-    centre, normal = (", ".join(f"{c + 0.0:.4f}" for c in v) for v in (fit.centre, fit.normal))
+    dome = fit.dome
+    axes = "" if dome.is_sphere else f"pad_axes = [{', '.join(map(_vector, dome.axes))}]\n"
     return (
         f'[[fingers]]\nname = "{name}"\ntip_frame = "{link}"\n'
-        f"pad_centre = [{centre}]\npad_normal = [{normal}]\npad_radius = {fit.radius:.4f}"
-        f"  # fits the mesh to {1e3 * fit.misfit:.1f} mm\n"
+        f"pad_centre = {_vector(dome.centre)}\npad_normal = {_vector(fit.normal)}\n{axes}"
+        f"pad_radius = {dome.radius:.4f}  # fits the mesh to {1e3 * fit.misfit:.1f} mm\n"
     )
+
+
+def _vector(v: Array) -> str:
+    return f"[{', '.join(f'{c + 0.0:.4f}' for c in v)}]"

@@ -52,10 +52,17 @@ def _check_link(hand: Hand, index: int) -> None:
 
 
 def _check_size(hand: Hand, finger: Finger) -> None:
-    if not SMALLEST_PAD < finger.pad_radius < LARGEST_PAD:
+    radius = finger.dome.radius
+    if not SMALLEST_PAD < radius < LARGEST_PAD:
         raise HandError(
-            f"finger '{finger.name}': pad_radius is {finger.pad_radius:g} m"
-            f"{_units(finger.pad_radius)}: expected {SMALLEST_PAD:g} to {LARGEST_PAD:g} m"
+            f"finger '{finger.name}': pad_radius is {radius:g} m{_units(radius)}: expected"
+            f" {SMALLEST_PAD:g} to {LARGEST_PAD:g} m"
+        )
+    longest = float(np.linalg.norm(finger.dome.axes, axis=1).max(initial=0.0))
+    if not longest < LARGEST_PAD:
+        raise HandError(
+            f"finger '{finger.name}': an axis of pad_axes is {longest:g} m long{_units(longest)}:"
+            f" expected less than {LARGEST_PAD:g} m"
         )
     pose = hand.at(hand.middle)
     centre = pose.pad_centres[hand.fingers.index(finger)]

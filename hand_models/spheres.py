@@ -20,7 +20,8 @@ from scipy.spatial import ConvexHull
 
 from hand_models.batch import BatchPlacements, IntArray
 from hand_models.cache import cached_arrays, hand_fingerprint
-from hand_models.geometry import link_points, pad_in_joint
+from hand_models.dome import CONE, Dome, directions_about
+from hand_models.geometry import dome_in_joint, link_points, pad_in_joint
 from hand_models.hand import Hand
 
 Array = NDArray[np.float64]
@@ -29,7 +30,8 @@ _GRID = 4e-3  # between candidate centres [m]
 _SAMPLE = 2.5e-3  # mean distance of the surface points to be covered [m]
 _THINNEST = 2e-3  # a centre is at least this deep in its link [m]
 _FRONT = np.radians(20.0)  # about a pad's normal, where no overhang may stand before the pad
-_VERSION = 2  # of the algorithm; part of the cache's key
+_FRONTS = 300  # directions in which none may stand before a dome, which fits its tip all over
+_VERSION = 3  # of the algorithm; part of the cache's key
 _FIELDS = ("joints", "centres", "radii", "link_indices", "finger_indices", "is_pad")
 
 
@@ -114,13 +116,13 @@ def _cover_hand(hand: Hand, overhang: float, slack: float) -> dict[str, NDArray[
     columns: list[tuple[int, Array, float, int, int, bool]] = []
     for i, finger in enumerate(hand.fingers):
         joint, centre, normal = pad_in_joint(hand, finger)
-        pads[joint] = _Pad(i, centre, normal, finger.pad_radius)
+        pads[joint] = _Pad(i, dome_in_joint(hand, finger), normal)
         columns.append((joint, centre, finger.pad_radius, finger.tip_frame_id, i, True))
     done: dict[bytes, tuple[Array, Array]] = {}  # fingers repeat the same links
     for index, shape in enumerate(hand.visual_model.geometryObjects):
         joint, points = int(shape.parentJoint), link_points(hand, index)
         pad = pads.get(joint)
-        key = points.tobytes() + (b"" if pad is None else pad.centre.tobytes())
+        key = points.tobytes() + (b"" if pad is None else pad.dome.centre.tobytes())
         if key not in done:
             done[key] = _cover_link(points, overhang, slack, pad)
         for centre, radius in zip(*done[key], strict=True):
@@ -138,16 +140,25 @@ class _Pad:
     """A pad in its joint's frame."""
 
     finger_index: int
-    centre: Array
+    dome: Dome
     normal: Array
-    radius: float
+
+    def covers(self, points: Array, slack: float) -> NDArray[np.bool_]:
+        """Which points are in the pad, or out of it by no more than a slack."""
+        if not self.dome.is_sphere:
+            return self.dome.holds(points, slack)
+        off = np.linalg.norm(points - self.dome.centre, axis=1)
+        return np.asarray(off <= self.dome.radius + slack)
 
     def room(self, points: Array) -> Array:
         """Largest radii with which spheres stay behind the planes the pad is to touch."""
-        offset = points - self.centre
+        if not self.dome.is_sphere:
+            u = directions_about(self.normal, CONE, _FRONTS)
+            return np.asarray((self.dome.heights(u) - points @ u.T).min(axis=1))
+        offset = points - self.dome.centre
         length = np.maximum(np.linalg.norm(offset, axis=1), 1e-9)
         angle = np.arccos(np.clip(offset @ self.normal / length, -1.0, 1.0))
-        return np.asarray(self.radius - length * np.cos(np.maximum(angle - _FRONT, 0.0)))
+        return np.asarray(self.dome.radius - length * np.cos(np.maximum(angle - _FRONT, 0.0)))
 
 
 def _cover_link(
@@ -157,7 +168,7 @@ def _cover_link(
     hull = ConvexHull(points)
     surface = _surface_points(points, hull)
     if pad is not None:
-        surface = surface[np.linalg.norm(surface - pad.centre, axis=1) > pad.radius + slack]
+        surface = surface[~pad.covers(surface, slack)]
     centres = _grid_points(points)
     depth = -(centres @ hull.equations[:, :3].T + hull.equations[:, 3]).max(axis=1)
     # A plate thinner than the grid still gets its middle layer, if a thin one.

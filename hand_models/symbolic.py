@@ -16,6 +16,7 @@ import casadi as ca
 import numpy as np
 import pinocchio as pin
 
+from hand_models.finger import Finger
 from hand_models.hand import Hand, HandError
 from hand_models.joints import joint_motion
 
@@ -87,14 +88,45 @@ def symbolic_pads(hand: Hand, q: ca.SX) -> tuple[ca.SX, ca.SX]:
         Two (3, F) matrices; the transposes of `HandPose.pad_centres` and `pad_normals` for a base
         at the identity. With a base (R_WB, p_WB):  R_WB @ centres + repmat(p_WB, 1, F).
     """
-    joint_placements = symbolic_joint_placements(hand.model, q)
     centres, normals = [], []
-    for finger in hand.fingers:
-        frame = hand.model.frames[finger.tip_frame_id]
-        R, p = _compose(joint_placements[frame.parentJoint], _constant(frame.placement))
+    for finger, (R, p) in zip(hand.fingers, _tips(hand, q), strict=True):
         centres.append(R @ ca.SX(finger.pad_centre) + p)
         normals.append(R @ ca.SX(finger.pad_normal))
     return ca.horzcat(*centres), ca.horzcat(*normals)
+
+
+def symbolic_balls(hand: Hand, q: ca.SX, fingers: Sequence[int], normals: ca.SX) -> ca.SX:
+    """Centres in B of the balls that touch as pads do, the transpose of `HandPose.ball_centres`.
+
+    Args:
+        fingers: Rows of k fingers.
+        normals: (3, k) outward normals of what they touch, in B.
+    """
+    tips = _tips(hand, q)
+    columns = []
+    for k, row in enumerate(fingers):
+        (R, p), finger = tips[row], hand.fingers[row]
+        columns.append(R @ _ball(finger, -R.T @ normals[:, k]) + p)
+    return ca.horzcat(*columns)
+
+
+def _tips(hand: Hand, q: ca.SX) -> list[Placement]:
+    """Placements of the fingers' tip frames in B."""
+    joint_placements = symbolic_joint_placements(hand.model, q)
+    frames = [hand.model.frames[finger.tip_frame_id] for finger in hand.fingers]
+    return [_compose(joint_placements[f.parentJoint], _constant(f.placement)) for f in frames]
+
+
+def _ball(finger: Finger, u: ca.SX) -> ca.SX:
+    """b(u) of `hand_models.dome`; a constant for a sphere."""
+    dome = finger.dome
+    if dome.is_sphere:
+        return ca.SX(finger.pad_centre)
+    along = ca.SX(dome.spread) @ u
+    return (
+        ca.SX(dome.centre) + along / ca.sqrt(ca.dot(u, along))
+        + (dome.radius - finger.pad_radius) * u
+    )  # fmt: skip
 
 
 def _frame_id(model: pin.Model, name: str) -> int:

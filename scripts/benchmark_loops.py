@@ -149,7 +149,8 @@ def run_session(
     belief = coarse_view(surface, angle=np.deg2rad(15.0), offset=0.015, rng=rng)
     raw = sensor in RAW_SENSORS and not readings
     mounted = raw_sense(sensor, surface, rng=rng) if raw else None
-    world = World(surface, mounted or simulated_sensor(sensor).session(rng=rng), rng=rng)
+    session = mounted or simulated_sensor(sensor).session(rng=rng)
+    world = World(surface, session, rng=rng, hand=_hand(hand))
     touches, why, slack = 0, "", SLACK if raw else 0.0
     steps = _beliefs(_hand(hand), world, belief, sensor, budget, seed, slack)
     try:

@@ -1,8 +1,9 @@
 """Propose a description (TOML) for a hand's URDF or MJCF, with a picture to correct it by.
 
-The links that move last are taken for fingertips; each one's pad is a sphere fitted to its mesh,
-its normal guessed from the way the finger closes. Writes HAND.toml and HAND.html (open it in a
-browser: every finger moves in turn, its pad drawn on it) into --out. Correct what is wrong, then
+The links that move last are taken for fingertips; each one's pad is a sphere, or a dome, fitted to
+its mesh, its normal guessed from the way the finger closes. Writes HAND.toml and HAND.html (open it
+in a browser: every finger moves in turn, its pad drawn on it) into --out. Correct what is wrong,
+then
     python scripts/plan_grasp.py --hand out/HAND.toml
 
 Exit status: 0 described, 2 the file cannot be described (and why).
@@ -71,8 +72,8 @@ def describe(options: Options) -> int:
 def _tell(console: Console, toml: Path, proposal: Proposal, hand: Hand) -> None:
     console.print(f"Palm: {escape(proposal.base)}; {hand.model.nq} joints; fingers:")
     for finger in hand.fingers:
-        radius = f"{1e3 * finger.pad_radius:.1f} mm"
-        console.print(f"  {escape(finger.name)}: {len(finger.joints)} joints, pad {radius}")
+        pad = finger.dome.in_words
+        console.print(f"  {escape(finger.name)}: {len(finger.joints)} joints, pad: {pad}")
     for doubt in proposal.doubts:
         console.print(f"[yellow]Look at[/] {escape(doubt)}")
     page = toml.with_suffix(".html")

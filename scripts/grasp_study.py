@@ -157,7 +157,8 @@ def _touched(
     rng: np.random.Generator,
 ) -> tuple[Belief, int]:
     """The belief when the goal is met or the touches are spent."""
-    world = World(surface, simulated_sensor(options.sensor).session(rng=rng), rng=rng)
+    session = simulated_sensor(options.sensor).session(rng=rng)
+    world = World(surface, session, rng=rng, hand=_hand(options.hand))
 
     def touch(probe: Probe) -> Contact | Miss:
         felt = world.touch(probe.approach, finger_axis_W=probe.approach.finger_axis)

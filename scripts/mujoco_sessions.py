@@ -209,7 +209,7 @@ def _world(
 
 @lru_cache
 def _hand(name: str) -> Hand:
-    return load_hand(name)
+    return load_hand(name).with_balls()
 
 
 @lru_cache(maxsize=32)

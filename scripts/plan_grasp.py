@@ -37,7 +37,15 @@ from output_files import require_writable, write_json
 from plan_options import Options, grasp_options, planner_options, require_sane
 from rich.console import Console
 from views import belief_by
-from worlds import among_what_stands, build_world, mover, pose_in, print_object, sensor_in
+from worlds import (
+    among_what_stands,
+    build_world,
+    hand_in,
+    mover,
+    pose_in,
+    print_object,
+    sensor_in,
+)
 
 from estimator.axis import angle_between, offset_at
 from estimator.belief import Belief
@@ -45,7 +53,7 @@ from estimator.contact import Contact, Miss, SensorNoise
 from estimator.readers.raw_files import write_raw
 from estimator.sensors import sensor_noise
 from estimator.surface import SurfaceOfRevolution
-from hand_models import HandError, load_hand
+from hand_models import HandError
 from hand_models.hand import Hand
 from planner.explore import Step, explore
 from planner.first_use import compile_ahead
@@ -111,7 +119,7 @@ def _scenario(options: Options) -> Scenario:
     require_sane(options)
     rng = np.random.default_rng(options.seed)
     surface = SurfaceOfRevolution(pose_in(options.world, rng), load_object(options.object))
-    hand = load_hand(options.hand)
+    hand = hand_in(options.world, options.hand)
     if options.wrist_mm is not None and hand.arm is not None:
         raise ValueError(
             f"--wrist-mm: {hand.name} is held by its arm; its description says where that stands"

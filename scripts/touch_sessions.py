@@ -123,7 +123,7 @@ def run(job: Job) -> Outcome:
     told = sensor_noise(job.sensor)
     common = OFFSET if job.setting in ("offset", "told") else None
     session = simulated_sensor(job.sensor).session(rng=rng, direction_offset=common)
-    world = World(surface, session, rng=rng)
+    world = World(surface, session, rng=rng, hand=_hand(job.hand))
     if job.setting == "told":
         told = replace(told, direction_offset=OFFSET)
     return _Session(job, surface, session, world, told).run(belief)

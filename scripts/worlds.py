@@ -1,7 +1,7 @@
 """The worlds that plan_grasp.py can touch: our own, and MuJoCo's with the object held or standing.
 
     own            the true surface in closed form; any sensor
-    mujoco         a physics engine moves the hand, the object is held; pads are domes of gel
+    mujoco         a physics engine moves the hand, the object is held; pads are balls of gel
     mujoco-table   the same, but the object stands upright on a table and can be pushed
 
 MuJoCo is installed with the extra `mujoco`; nothing here imports it unless it is asked for.
@@ -19,6 +19,7 @@ from rich.console import Console
 from estimator.axis import Axis
 from estimator.readers.raw_sensors import RAW_SENSORS, RawSensor, raw_sensor
 from estimator.surface import SurfaceOfRevolution
+from hand_models import load_hand
 from hand_models.hand import Hand
 from planner.carrying import Move, Stop
 from planner.motions.surroundings import Box
@@ -52,6 +53,16 @@ def sensor_in(world: str, sensor: str) -> str:
     return _OF_MUJOCO
 
 
+def hand_in(world: str, name: str) -> Hand:
+    """A hand as it is in that world: in MuJoCo its pads are balls of gel.
+
+    Raises:
+        HandError: As `load_hand`.
+    """
+    hand = load_hand(name)
+    return hand if world == "own" else hand.with_balls()
+
+
 def slack_in(world: str, sensor: str, name: str) -> float:
     """How far contacts may be from where a perfectly round object at rest would have them [m]."""
     real = Path(name).suffix.lower() in (".json", *SUFFIXES)
@@ -74,8 +85,8 @@ def build_world(
     """
     if world == "own":
         if sensor in RAW_SENSORS:
-            return World(surface, raw_sense(sensor, surface, rng=rng), rng=rng)
-        return World(surface, simulated_sensor(sensor).session(rng=rng), rng=rng)
+            return World(surface, raw_sense(sensor, surface, rng=rng), rng=rng, hand=hand)
+        return World(surface, simulated_sensor(sensor).session(rng=rng), rng=rng, hand=hand)
     try:
         from sim_sensor.physics.mujoco_models import Standing
         from sim_sensor.physics.mujoco_world import MujocoWorld

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from sim_sensor.noise import Session, SimulatedSensor, Site, simulated_sensor
 from sim_sensor.objects import OBJECTS, load_object
-from sim_sensor.world import TouchPath, TouchRecord, World
+from sim_sensor.routes import TouchPath
+from sim_sensor.world import TouchRecord, World
 
 __all__ = [
     "OBJECTS",

@@ -1,7 +1,8 @@
 """The world for rehearsal: a true object at its true pose, and fingertips that really touch it.
 
-A pad is a sphere that moves along its planned approach and stops where it first meets the solid:
-the wall, a flat cap or the rim between them. Where the plan thought it would touch plays no part.
+A pad is a ball, or the dome of a hand (`routes`), that moves along its planned approach and stops
+where it first meets the solid: the wall, a flat cap or the rim between them. Where the plan thought
+it would touch plays no part.
 
 Conventions
     A cap is flat: both curvatures zero, directions without meaning.
@@ -16,35 +17,31 @@ Conventions
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from estimator.contact import Contact, Miss
 from estimator.surface import Geometry, Place, SurfaceOfRevolution
 from estimator.vectors import Array, basis_across, frozen, unit
+from hand_models.hand import Hand
 from sim_sensor.dented_solid import DentedSolid
 from sim_sensor.feeling import Felt, ReadingSense, Sense, Touched
 from sim_sensor.noise import Session, Site
+from sim_sensor.routes import (
+    TOUCHING,
+    BallRoute,
+    HandPath,
+    Route,
+    TouchPath,
+    dome_route,
+    first_touch,
+)
 from sim_sensor.scanned import Scan, felt_at
 from sim_sensor.solid import NearestPlace, Part, Solid
 
 EDGE_RADIUS = 0.5e-3  # fillet of a rim [m]
-TOUCHING = 1e-10  # how far along the path a touch is known [m]
-
-
-class TouchPath(Protocol):
-    """What the world needs of an approach."""
-
-    @property
-    def tip_centres(self) -> Array:
-        """Centres of the pad's sphere in the world, in order, straight in between, (K, 3) [m]."""
-
-    @property
-    def pad_radius(self) -> float:
-        """Radius of the pad's sphere [m]."""
+_ON_IT = 1e-9  # a point so near the surface shows no direction from it [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +50,8 @@ class TouchRecord:
 
     Args:
         outcome: What the sensor said, or that the path met nothing.
-        tip: Centre of the pad's sphere where it stopped, world [m], shape (3,).
+        tip: Centre of the pad's ball where it stopped, world [m], shape (3,): of a dome, the one
+            that touches, or after a miss the nearest.
         stop: Where on the path, counted in its points with fractions, in [0, K - 1].
         truth: Exact geometry at the touched place; None after a miss.
         part: The part of the object that was touched; None after a miss.
@@ -77,14 +75,20 @@ class World:
         surface: The object at its pose; its ends are flat caps.
         sensor: The mounted sensor: a session of readings, or a sense of raw signals.
         rng: For the readings.
+        hand: Whose pads touch; without, they are balls.
     """
 
     def __init__(
-        self, surface: SurfaceOfRevolution, sensor: Session | Sense, *, rng: np.random.Generator
+        self,
+        surface: SurfaceOfRevolution,
+        sensor: Session | Sense,
+        *,
+        rng: np.random.Generator,
+        hand: Hand | None = None,
     ) -> None:
         self.surface = surface
         self._sense: Sense = ReadingSense(sensor) if isinstance(sensor, Session) else sensor
-        self._rng = rng
+        self._rng, self._hand = rng, hand
         profile = surface.profile
         self._solid = DentedSolid(profile) if isinstance(profile, Scan) else Solid(profile)
         self._records: list[TouchRecord] = []
@@ -113,14 +117,16 @@ class World:
             ValueError: Not a path: fewer than two points, none that differ, wrong shape, not
                 finite, or a radius that is not positive.
         """
-        centres, radius = _checked(path)
-        overlap = radius - self.signed_distance(centres[0])
-        route = np.vstack([self._free_start(centres, radius), centres]) if overlap > 0 else centres
-        stop = first_touch(route, lambda point: self.signed_distance(point) - radius)
+        route = self._route(path)
+        centre, radius = route.ball(0.0, self._distance)
+        overlap = radius - self.signed_distance(centre)
+        afar = route.from_afar(self._away(path)) if overlap > 0 else route
+        stop = first_touch(afar, self._distance)
         if stop is None:
-            record = TouchRecord(Miss(centres[-1], radius), frozen(centres[-1]), len(centres) - 1.0)
+            tip, radius = route.ball(route.last, self._distance)
+            record = TouchRecord(Miss(tip, radius), frozen(tip), route.last)
         else:
-            tip = _along(route, stop)
+            tip, radius = afar.ball(stop, self._distance)
             if overlap > 0:
                 stop = max(stop - 1.0, 0.0)  # the route has one point before the path
             touched = self._touched(tip, site, finger_axis_W)
@@ -132,6 +138,14 @@ class World:
             )  # fmt: skip
         self._records.append(record)
         return record.outcome
+
+    def _route(self, path: TouchPath) -> Route:
+        centres, radius = _checked(path)
+        hand = self._hand
+        if hand is None or not isinstance(path, HandPath):
+            return BallRoute(centres, radius)
+        domed = not hand.finger(path.finger).dome.is_sphere
+        return dome_route(hand, path) if domed else BallRoute(centres, radius)
 
     def _touched(self, tip: Array, site: Site | None, finger_axis_W: Array | None) -> Touched:
         """Where a pad rests whose centre stopped at `tip`."""
@@ -161,55 +175,28 @@ class World:
         x, y, z = self.surface.frame @ (point_W - self.surface.axis.point)
         return self._solid.nearest(float(np.hypot(x, y)), float(z), float(np.arctan2(y, x)))
 
-    def _free_start(self, centres: Array, radius: float) -> Array:
-        """A point behind the path's start where the pad is clear of the object."""
-        steps = np.diff(centres, axis=0)
+    def _distance(self, point_W: Array) -> tuple[float, Array]:
+        """Of a point, and the normal at the place nearest to it."""
+        nearest = self._nearest(point_W)
+        x, y, u = self.surface.frame
+        out = np.cos(nearest.theta) * x + np.sin(nearest.theta) * y
+        place = self.surface.axis.point + nearest.rho * out + nearest.z * u
+        if abs(nearest.distance) < _ON_IT:
+            return nearest.distance, self._geometry(point_W, nearest).n
+        return nearest.distance, unit(point_W - place) * np.sign(nearest.distance)
+
+    def _away(self, path: TouchPath) -> Array:
+        """From the path's start back to where the pad is clear of the object."""
+        steps = np.diff(path.tip_centres, axis=0)
         first = steps[np.argmax(np.linalg.norm(steps, axis=1) > TOUCHING)]
         low, high = self.surface.profile.z_range
-        reach = 2.0 * self._solid.largest_radius + (high - low) + 2.0 * radius
-        return np.asarray(centres[0] - reach * unit(first))
-
-
-def first_touch(route: Array, clearance: Callable[[Array], float]) -> float | None:
-    """Where along a polyline the clearance first vanishes, in points with fractions.
-
-    Clearance cannot change faster than the pad moves, so an interval whose end clearances add up
-    to more than its length is free. What is left is halved, the earlier half first.
-
-    Args:
-        route: Points of the polyline, shape (K, 3) [m].
-        clearance: Of a pad centred at a point [m]; changes at most as fast as the point moves.
-    Returns:
-        To within `TOUCHING` of path length; None where the polyline ends clear.
-    """
-    gaps = [clearance(point) for point in route]
-    open_intervals = [(float(i), gaps[i], i + 1.0, gaps[i + 1]) for i in range(len(route) - 1)][
-        ::-1
-    ]
-    while open_intervals:
-        a, gap_a, b, gap_b = open_intervals.pop()
-        if gap_a <= 0:
-            return a
-        length = float(np.linalg.norm(_along(route, b) - _along(route, a)))
-        if gap_b > 0 and gap_a + gap_b > length:
-            continue
-        if length <= TOUCHING:
-            return b
-        middle = 0.5 * (a + b)
-        gap = clearance(_along(route, middle))
-        open_intervals += [(middle, gap, b, gap_b), (a, gap_a, middle, gap)]
-    return None
+        reach = 2.0 * self._solid.largest_radius + (high - low) + 2.0 * path.pad_radius
+        return np.asarray(-reach * unit(first))
 
 
 def _geometry(p: Array, n: Array, k_theta: Array, kappa_theta: float, kappa_z: float) -> Geometry:
     """Geometry with the meridian's direction completed: k_theta x k_z = n."""
     return Geometry(p, n, k_theta, np.cross(n, k_theta), np.array(kappa_theta), np.array(kappa_z))
-
-
-def _along(route: Array, at: float) -> Array:
-    """The point of a polyline at a place counted in its points."""
-    i = min(int(at), len(route) - 2)
-    return np.asarray(route[i] + (at - i) * (route[i + 1] - route[i]))
 
 
 def _checked(path: TouchPath) -> tuple[Array, float]:

@@ -121,7 +121,7 @@ def test_a_finger_is_pulled_along_a_line_within_its_limits():
     line = pose.pad_centres[1] + np.linspace(0.0, 0.02, 9)[:, None] * pose.pad_normals[1]
     start = np.repeat(q[None], 9, axis=0)
     for marching in (False, True):
-        way = pulled(hand, finger, X_WB, start, line, marching=marching)
+        way = pulled(hand, finger, X_WB, start, line, -pose.pad_normals[1], marching=marching)
         np.testing.assert_allclose(way.centres, line, atol=1e-6)
         for row, x in enumerate(way.path):
             there = hand.at(x, X_WB)
@@ -129,7 +129,7 @@ def test_a_finger_is_pulled_along_a_line_within_its_limits():
             np.testing.assert_allclose(there.pad_normals[1], way.normals[row], atol=1e-12)
         idle = np.setdiff1d(np.arange(16), finger.q_indices)
         np.testing.assert_array_equal(way.path[:, idle], start[:, idle])
-    far = pulled(hand, finger, X_WB, start[:1], line[:1] + 1.0).path[0]
+    far = pulled(hand, finger, X_WB, start[:1], line[:1] + 1.0, -pose.pad_normals[1]).path[0]
     assert np.all((far >= hand.lower) & (far <= hand.upper))
 
 

@@ -88,16 +88,16 @@ def test_a_sphere_is_fitted_to_points_of_a_sphere_and_of_a_part_of_one():
     normal = np.array([0.6, 0.0, 0.8])
     for kept in (points, points[points @ normal > 0.0]):
         fit = fit_pad(kept + 0.03, normal)
-        np.testing.assert_allclose(fit.centre, 0.03, atol=1e-4)
-        assert fit.radius == pytest.approx(0.011, abs=1e-4)
+        np.testing.assert_allclose(fit.dome.centre, 0.03, atol=1e-4)
+        assert fit.dome.radius == pytest.approx(0.011, abs=1e-4)
         assert fit.misfit < 5e-5
 
 
 def test_a_flat_tip_is_met_by_a_sphere_that_touches_where_it_does():
     corners = np.array([[x, y, z] for x in (-0.01, 0.01) for y in (-0.01, 0.01) for z in (0, 0.02)])
     fit = fit_pad(corners, np.array([0.0, 0.0, 1.0]), cone=0.1)
-    assert fit.centre[2] + fit.radius == pytest.approx(0.02, abs=1e-3)
-    np.testing.assert_allclose(fit.centre[:2], 0.0, atol=1e-3)
+    assert fit.dome.centre[2] + fit.dome.radius == pytest.approx(0.02, abs=1e-3)
+    np.testing.assert_allclose(fit.dome.centre[:2], 0.0, atol=1e-3)
 
 
 def test_what_cannot_be_described_is_told_in_one_line(tmp_path):

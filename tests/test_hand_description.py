@@ -154,6 +154,8 @@ WRONG_FIELDS = [
     ("0.008", "true", "pad_radius must be a positive number of metres, got True"),
     ("pad_radius = 0.008", "pad_radius_mm = 8", "fingers.0.: unknown key 'pad_radius_mm'"),
     ("pad_radius = 0.008", "", "fingers.0.: key 'pad_radius' is missing"),
+    ("0.008", "0.008\npad_axes = [[1, 0]]", "pad_axes must be three finite numbers, got"),
+    ("0.008", "0.008\npad_axes = 1", "pad_axes must be a list of at most 3 vectors, got 1"),
     ("[[fingers]]", "[fingers]", r"fingers must be one or more \[\[fingers\]\] tables"),
     (DESCRIPTION[DESCRIPTION.index("[[") :], "", r"must be one or more \[\[fingers\]\] tables"),
     (
@@ -192,6 +194,11 @@ WRONG_FIELDS = [
 WRONG_SIZES = [
     ("0.008", "8", "pad_radius is 8 m, as if millimetres were taken for metres"),
     ("[0.0, 0.005, 0.0]", "[0.0, 5.0, 0.0]", "finger 'only' is 4.95 m long .*as if millimetres"),
+    (
+        "0.008",
+        "0.008\npad_axes = [[0, 0, 9]]",
+        "an axis of pad_axes is 9 m long, as if millimetres",
+    ),
     (
         "[0.0, 0.005, 0.0]",
         f"[{-LOWER}, 0.0, 0.0]",

@@ -67,7 +67,8 @@ def test_pad_jacobians_agree_with_finite_differences_up_to_the_limits(
 def test_a_pad_away_from_its_frames_origin_is_carried_by_the_turning() -> None:
     hand = load_hand("allegro_right")
     plain = hand.finger("thumb")
-    offset = replace(plain, pad_centre=np.array([0.01, -0.02, 0.03]))
+    moved = replace(plain.dome, centre=np.array([0.01, -0.02, 0.03]))
+    offset = replace(plain, dome=moved)
     pose = replace(hand, fingers=(offset,)).at(hand.upper)
     centre_rates, _ = _differences(pose, offset)
     np.testing.assert_allclose(pose.pad_jacobian(offset), centre_rates, atol=ACCURACY)

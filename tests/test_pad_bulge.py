@@ -1,4 +1,4 @@
-"""A pad is planned as a sphere; where its mesh is more than that is measured and allowed for."""
+"""A pad is planned as a dome; where its mesh is more than that is measured and allowed for."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ CONE = np.radians(30.0)
 
 
 def entered(hand, finger, q, u):
-    """How deep the tip's meshes are, by coal, behind the plane that the pad's sphere touches."""
-    pose, i = hand.at(q), hand.fingers.index(finger)
-    behind = coal.Halfspace(-u, float(-u @ pose.pad_centres[i] - finger.pad_radius))
+    """How deep the tip's meshes are, by coal, behind the plane that the pad touches."""
+    ball = hand.at(q).ball_centres([hand.fingers.index(finger)], [-u])[0]
+    behind = coal.Halfspace(-u, float(-u @ ball - finger.pad_radius))
     near = HandCollision(hand).object_clearance(q, pin.SE3.Identity(), [behind], pin.SE3.Identity())
     joint = hand.model.frames[finger.tip_frame_id].parentJoint
     own = [
@@ -55,13 +55,14 @@ def test_a_tip_enters_no_plane_deeper_than_its_bulge(name):
 def test_balls_have_none():
     assert np.all(pad_bulges(load_hand("trifinger_edu"), CONE) < 1.2e-4)
     assert np.all(pad_bulges(load_hand("allegro_right"), CONE) < 2.5e-4)
-    no_pad = replace(load_hand("trifinger_edu").fingers[0], pad_radius=0.02)
+    finger = load_hand("trifinger_edu").fingers[0]
+    no_pad = replace(finger, dome=replace(finger.dome, radius=0.02))
     hand = replace(load_hand("trifinger_edu"), fingers=(no_pad,))
     assert pad_bulges(hand, CONE)[0] == 0.0
 
 
 def test_a_hand_of_coupled_joints_reaches_what_its_postures_make():
-    """Psyonic, three pads at once on cylinders; its tips stand out of their spheres by 0.6 mm."""
+    """Psyonic, three pads at once on cylinders: six joints, and tips that are cylinders."""
     hand, rng = load_hand("psyonic_right"), np.random.default_rng(0)
     tools, solver = hand_tools(hand, ReachOptions()), ReachSolver(hand, ReachOptions())
     reached = 0

@@ -18,8 +18,9 @@ from estimator.surface import SurfaceOfRevolution
 from estimator.vectors import Array
 from sim_sensor.noise import simulated_sensor
 from sim_sensor.objects import load_object
+from sim_sensor.routes import BallRoute, first_touch
 from sim_sensor.solid import Part
-from sim_sensor.world import EDGE_RADIUS, World, first_touch
+from sim_sensor.world import EDGE_RADIUS, World
 
 AXIS = Axis([0.3, -0.2, 0.5], [0.3, -0.2, 0.9])
 CONVEX_AND_NOT = ("can", "vase", "bottle", "paper-lathe")
@@ -240,7 +241,9 @@ def test_touch_is_found_to_a_nanometre_on_an_oblique_path() -> None:
     total = 0.03 + RADIUS
     for x in (0.0, 0.5 * total, 0.99 * total):
         route = np.array([[x, -0.2, 0.0], [x, 0.0, 0.01]])
-        stop = first_touch(route, lambda point: world.signed_distance(point) - RADIUS)
+        stop = first_touch(
+            BallRoute(route, RADIUS), lambda point: (world.signed_distance(point), np.zeros(3))
+        )
         assert stop == pytest.approx((0.2 - np.sqrt(total**2 - x**2)) / 0.2, abs=1e-8)
 
 

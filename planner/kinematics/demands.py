@@ -15,7 +15,7 @@ from estimator.compiled import compiled_part
 from estimator.vectors import Array, Index
 from hand_models.chains import Chains
 from planner.kinematics.meridian import Meridian, distance_and_slopes
-from planner.kinematics.placing import pad_jacobian, place_joints, place_pad
+from planner.kinematics.placing import ball_jacobian, place_ball, place_joints, place_pad
 from planner.kinematics.small import clear, times, transposed_times
 
 PLACE_UNIT = 2e-5  # so far off its place [m] weighs as much as ...
@@ -96,10 +96,12 @@ def _pad_rows(
 ) -> tuple[float, float]:  # fmt: skip
     """Three rows of a pad's place, one of its angle if beyond the cone; gap and angle."""
     finger, n = demands.fingers[j], demands.normals[j]
-    centre, pad, arm = np.zeros(3), np.zeros(3), np.zeros(3)
-    moves, turns = np.zeros((3, nq)), np.zeros((3, nq))
+    centre, pad, arm, inward = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
+    moves, turns, turning = np.zeros((3, nq)), np.zeros((3, nq)), np.zeros((3, 3))
+    inward[0], inward[1], inward[2] = transposed_times(R, -n[0], -n[1], -n[2])
     place_pad(chains, finger, joints_R, joints_p, centre, pad)
-    pad_jacobian(chains, finger, joints_R, joints_p, centre, moves, turns)
+    place_ball(chains, finger, joints_R, joints_p, inward, centre, turning)
+    ball_jacobian(chains, finger, joints_R, joints_p, inward, centre, turning, moves, turns)
     away, square, cosine = chains.pad_radii[finger] + demands.lengths[knot], 0.0, 0.0
     there, facing = times(R, centre[0], centre[1], centre[2]), times(R, pad[0], pad[1], pad[2])
     for a in range(3):
@@ -111,6 +113,7 @@ def _pad_rows(
         cosine -= facing[a] * n[a]
     angle = acos(min(max(cosine, -1.0), 1.0))
     _base_rows(arm, rows, first, nq, 1.0 / PLACE_UNIT)
+    _going_along(turning, R, n, rows, first, nq, 1.0 / PLACE_UNIT)
     for c in range(nq):
         column = demands.columns[knot, c]
         for a in range(3):
@@ -139,6 +142,23 @@ def _base_rows(arm: Array, rows: Array, first: int, nq: int, scale: float) -> No
     rows[first, nq + 4], rows[first, nq + 5] = arm[2] * scale, -arm[1] * scale
     rows[first + 1, nq + 3], rows[first + 1, nq + 5] = -arm[2] * scale, arm[0] * scale
     rows[first + 2, nq + 3], rows[first + 2, nq + 4] = arm[1] * scale, -arm[0] * scale
+
+
+@compiled_part
+def _going_along(
+    turning: Array, R: Array, n: Array, rows: Array, first: int, nq: int, scale: float
+) -> None:
+    """How a pad's ball goes along as the base turns: by (db/du) (w x n)."""
+    for a in range(3):
+        b, c = (a + 1) % 3, (a + 2) % 3  # w = e_a: e_a x n has n_b at c and -n_c at b
+        x = R[c, 0] * n[b] - R[b, 0] * n[c]
+        y = R[c, 1] * n[b] - R[b, 1] * n[c]
+        z = R[c, 2] * n[b] - R[b, 2] * n[c]
+        u, v, w = times(turning, x, y, z)
+        u, v, w = times(R, u, v, w)
+        rows[first, nq + 3 + a] += scale * u
+        rows[first + 1, nq + 3 + a] += scale * v
+        rows[first + 2, nq + 3 + a] += scale * w
 
 
 @compiled_part

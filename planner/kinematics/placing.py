@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from math import cos, sin
+from math import cos, sin, sqrt
+
+import numpy as np
 
 from estimator.compiled import compiled, compiled_part
 from estimator.vectors import Array
@@ -65,6 +67,62 @@ def place_pad(
         for k in range(3):
             centre[i] += R[j, i, k] * chains.pad_centres[finger, k]
             normal[i] += R[j, i, k] * chains.pad_normals[finger, k]
+
+
+@compiled
+def place_ball(
+    chains: Chains, finger: int, R: Array, p: Array, facing: Array, centre: Array, turning: Array
+) -> None:
+    """The ball of the pad's radius that touches along `facing` as the pad does.
+
+    Args:
+        facing: (3,) unit vector out of the pad, minus the normal of what it touches; like all here
+            in the hand base frame.
+        centre: (3,) of the ball (`hand_models.dome`, b).
+        turning: (3, 3) db/du, by which it goes along with the direction; zero for a sphere.
+    """
+    j, A, u, e = chains.pad_joints[finger], chains.dome_spreads[finger], np.zeros(3), np.zeros(3)
+    more, stretch = chains.dome_radii[finger], 0.0
+    for i in range(3):
+        for k in range(3):
+            u[i] += R[j, k, i] * facing[k]
+    for i in range(3):
+        for k in range(3):
+            e[i] += A[i, k] * u[k]
+        stretch += u[i] * e[i]
+    stretch = sqrt(stretch)
+    local, scale = np.zeros((3, 3)), 1.0 / stretch if stretch > 0.0 else 0.0
+    for i in range(3):
+        e[i] *= scale
+    for i in range(3):
+        centre[i] = p[j, i]
+        for k in range(3):
+            centre[i] += R[j, i, k] * (chains.dome_centres[finger, k] + e[k] + more * u[k])
+            local[i, k] = scale * (A[i, k] - e[i] * e[k]) + (more if i == k else 0.0)
+    for i in range(3):
+        for k in range(3):
+            turning[i, k] = 0.0
+            for a in range(3):
+                for b in range(3):
+                    turning[i, k] += R[j, i, a] * local[a, b] * R[j, k, b]
+
+
+@compiled
+def ball_jacobian(
+    chains: Chains, finger: int, R: Array, p: Array, facing: Array, centre: Array, turning: Array,
+    moves: Array, turns: Array,
+) -> None:  # fmt: skip
+    """d centre / d q of such a ball for a fixed `facing`, and the pad's angular velocity, (3, nq).
+
+    As the tip turns by w, the direction turns by -w on it:  db = w x arm - (db/du) (w x u).
+    """
+    pad_jacobian(chains, finger, R, p, centre, moves, turns)
+    for c in range(moves.shape[1]):
+        x = turns[1, c] * facing[2] - turns[2, c] * facing[1]
+        y = turns[2, c] * facing[0] - turns[0, c] * facing[2]
+        z = turns[0, c] * facing[1] - turns[1, c] * facing[0]
+        for i in range(3):
+            moves[i, c] -= turning[i, 0] * x + turning[i, 1] * y + turning[i, 2] * z
 
 
 @compiled

@@ -20,8 +20,8 @@ from estimator.linear import factor, solve_factored
 from estimator.vectors import Array, Index
 from hand_models.chains import Chains
 from planner.kinematics.meridian import Meridian, foot
-from planner.kinematics.placing import pad_jacobian, place_joints, place_pad
-from planner.kinematics.small import clear, turn_by, turned
+from planner.kinematics.placing import ball_jacobian, place_ball, place_joints, place_pad
+from planner.kinematics.small import clear, times, transposed_times, turn_by, turned
 
 GAP_UNIT = 0.3e-3  # so far off the surface weighs as much as ...
 ANGLE_UNIT = 0.2  # ... this much of pad angle beyond the cone [rad]
@@ -48,12 +48,15 @@ def rest(
     """
     m, nq, J = fingers.shape[1], q.shape[1], len(chains.parents)
     joints_R, joints_p = np.zeros((J, 3, 3)), np.zeros((J, 3))
-    pads, jacobians = np.zeros((m, 3, 3)), np.zeros((m, 2, 3, nq))  # centre, normal, n
+    pads, jacobians = np.zeros((m, 4, 3)), np.zeros((m, 2, 3, nq))  # centre, normal, n, facing
     rows, residual = np.zeros((ROWS * m, nq + 6)), np.zeros(ROWS * m)
     system, lower = np.zeros((ROWS * m, ROWS * m)), np.zeros((ROWS * m, ROWS * m))
     step = np.zeros(nq + 6)
+    looks = 1 if np.all(chains.dome_radii == 0.0) else 2  # a dome again along what it met
     for i in range(len(q)):
-        for turn in range(iterations + 1):
+        place_joints(chains, q[i], joints_R, joints_p)
+        _face(chains, fingers[i], R[i], joints_R, joints_p, pads)
+        for turn in range(iterations + looks):
             place_joints(chains, q[i], joints_R, joints_p)
             _pads(chains, fingers[i], R[i], p[i], joints_R, joints_p, pads, jacobians)
             _residuals(
@@ -66,17 +69,36 @@ def rest(
 
 
 @compiled_part
+def _face(
+    chains: Chains, fingers: Index, R: Array, joints_R: Array, joints_p: Array, pads: Array
+) -> None:
+    """Pads begin as if they touched right in their middle."""
+    centre, normal = np.zeros(3), np.zeros(3)
+    for k in range(len(fingers)):
+        place_pad(chains, fingers[k], joints_R, joints_p, centre, normal)
+        n = times(R, -normal[0], -normal[1], -normal[2])
+        pads[k, 3, 0], pads[k, 3, 1], pads[k, 3, 2] = n
+
+
+@compiled_part
 def _pads(
     chains: Chains, fingers: Index, R: Array, p: Array, joints_R: Array, joints_p: Array,
     pads: Array, jacobians: Array,
 ) -> None:  # fmt: skip
-    """Centres, normals and Jacobians of the touching pads in the object frame."""
+    """Centres, normals and Jacobians of the touching pads in the object frame.
+
+    A pad's ball is the one that touches along the normals met so far, the last ones above all:
+    along the very last, a cylinder would go to and fro between its ends.
+    """
     nq = jacobians.shape[3]
-    centre, normal = np.zeros(3), np.zeros(3)
+    centre, normal, facing, turning = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros((3, 3))
     moves, turns = np.zeros((3, nq)), np.zeros((3, nq))
     for k in range(len(fingers)):
-        place_pad(chains, fingers[k], joints_R, joints_p, centre, normal)
-        pad_jacobian(chains, fingers[k], joints_R, joints_p, centre, moves, turns)
+        j, n = fingers[k], pads[k, 3]
+        facing[0], facing[1], facing[2] = transposed_times(R, -n[0], -n[1], -n[2])
+        place_pad(chains, j, joints_R, joints_p, centre, normal)
+        place_ball(chains, j, joints_R, joints_p, facing, centre, turning)
+        ball_jacobian(chains, j, joints_R, joints_p, facing, centre, turning, moves, turns)
         for a in range(3):
             pads[k, 0, a], pads[k, 1, a] = p[a], 0.0
             for b in range(3):
@@ -113,6 +135,7 @@ def _residuals(
         w = sqrt(1.0 + dr**2)
         n = pads[k, 2]
         n[0], n[1], n[2] = centre[0] / rho / w, centre[1] / rho / w, -dr / w
+        _go_along(n, pads[k, 3])
         gap = ((rho - r) - dr * (centre[2] - z)) / w - chains.pad_radii[fingers[k]]
         cosine = -(pad[0] * n[0] + pad[1] * n[1] + pad[2] * n[2])
         angle = acos(min(max(cosine, -1.0), 1.0))
@@ -126,6 +149,14 @@ def _residuals(
             rows[first, c] = along / GAP_UNIT
             rows[first + 4, c] = move[2, c] / HEIGHT_UNIT if beyond != 0.0 else 0.0
         _turned_away(n, pad, max(angle - cone, 0.0), angle, rho, move, spin, first, rows, residual)
+
+
+@compiled_part
+def _go_along(n: Array, facing: Array) -> None:
+    """Turn a pad's direction half of the way to a normal."""
+    x, y, z = facing[0] + n[0], facing[1] + n[1], facing[2] + n[2]
+    length = max(sqrt(x * x + y * y + z * z), 1e-9)
+    facing[0], facing[1], facing[2] = x / length, y / length, z / length
 
 
 @compiled_part

@@ -35,8 +35,9 @@ class Approach:
         finger: Its name.
         path: Configurations of the whole hand, from stand-off to overshoot, (K, nq) [rad].
         bases: Pose of the hand base for each, or one for all (`X_WB`).
-        tip_centres: Centres of the pad's sphere in the world, (K, 3) [m].
-        pad_radius: Of that sphere [m].
+        tip_centres: Centres in the world of the ball that touches the believed surface where the
+            pad does (`hand_models.dome`), (K, 3) [m].
+        pad_radius: Of that ball [m].
         contact_index: The waypoint at which the believed object is touched.
         standoff, overshoot: Lengths before and behind the contact [m].
         straightness: Largest distance of a waypoint from the straight line [m].
@@ -81,8 +82,8 @@ def approach_by_base(hand: Hand, reach: Reach, *, stroke: float = ARM_STROKE) ->
         pin.SE3(reach.X_WB.rotation, reach.X_WB.translation + s * reach.normals[0]) for s in along
     )
     path = np.repeat(reach.q[None], len(along), axis=0)
-    row = hand.fingers.index(finger)
-    tips = np.array([hand.at(reach.q, X_WB).pad_centres[row] for X_WB in bases])
+    row, normals = hand.fingers.index(finger), reach.normals[:1]
+    tips = np.vstack([hand.at(reach.q, X_WB).ball_centres([row], normals) for X_WB in bases])
     return Approach(
         finger.name, _frozen(path), bases, _frozen(tips), finger.pad_radius, contact,
         stroke, stroke, 0.0, hand.at(reach.q, reach.X_WB).link_axis(finger),
@@ -98,7 +99,7 @@ def _finger_approach(hand: Hand, reach: Reach, i: int, collision: HandCollision)
     knots = [x[finger.q_indices] for x in (reach.q_standoff, reach.q, reach.q_overshoot)]
     path = np.repeat(reach.q_standoff[None], len(along), axis=0)
     path[:, finger.q_indices] = [_between(knots, s, before, behind) for s in along]
-    found = pulled(hand, finger, reach.X_WB, path, line)
+    found = pulled(hand, finger, reach.X_WB, path, line, reach.normals[i])
     path, tips = found.path, found.centres
     off_line = np.linalg.norm(tips - line, axis=1)
     end = _end(path, off_line, contact, collision)

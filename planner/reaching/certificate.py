@@ -63,9 +63,9 @@ class Tolerances:
         self_clearance: Least distance between links [m].
         object_clearance: Least distance between object and links that do not touch [m]. What is
             fixed to a touching pad only has to be outside, but for what its mesh stands out of
-            the pad's sphere that is planned with (`hand_models.pads.pad_bulges`).
+            the pad that is planned with (`hand_models.pads.pad_bulges`).
         pad_depth: How deep a touching pad may be in the object, where it is hollow or where its
-            mesh is more than a sphere [m].
+            mesh is more than its pad [m].
     """
 
     position: float
@@ -95,7 +95,7 @@ def certify(
     pose = hand.at(q, X_WB)
     order = [hand.fingers.index(hand.finger(name)) for name in fingers]
     radii = np.array([hand.fingers[i].pad_radius for i in order])
-    gap = pose.pad_centres[order] - (points + radii[:, None] * normals)
+    gap = pose.ball_centres(order, normals) - (points + radii[:, None] * normals)
     cosine = -np.sum(pose.pad_normals[order] * normals, axis=1)
     clearance = collision.object_clearance(q, X_WB, solid.slices, solid.X_WO)
     links, tip_links = _nearest(hand, clearance, order)

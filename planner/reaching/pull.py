@@ -21,7 +21,8 @@ class Pulled:
 
     Args:
         path: (K, nq).
-        centres, normals: Of the pad in the world, (K, 3) [m], unit.
+        centres: In the world, of the ball that touches as the pad does, (K, 3) [m].
+        normals: Of the pad in the world, (K, 3), unit.
     """
 
     path: Array
@@ -35,15 +36,17 @@ def pulled(
     X_WB: pin.SE3,
     path: Array,
     targets: Array,
+    n_W: Array,
     *,
     iterations: int = _ITERATIONS,
     marching: bool = False,
 ) -> Pulled:
-    """Configurations with the pad's centre at the targets, or as near as limits and steps allow.
+    """Configurations with the pad's ball at the targets, or as near as limits and steps allow.
 
     Args:
         path: Where each starts, (K, nq); only the finger's own joints move, within their limits.
-        targets: In the world, (K, 3) [m].
+        targets: Of the ball's centre in the world, (K, 3) [m].
+        n_W: Outward normal of what the pad is to touch (`hand_models.dome`), (3,).
         iterations: At most so many, each.
         marching: Whether each starts where the one before it ended; only the first counts then.
     """
@@ -51,6 +54,6 @@ def pulled(
     local = np.ascontiguousarray((targets - X_WB.translation) @ X_WB.rotation)
     centres, normals = np.zeros_like(local), np.zeros_like(local)
     row, joints = hand.fingers.index(finger), np.asarray(finger.q_indices, dtype=np.intp)
-    pull(chains_of(hand), row, joints, path, local, iterations, marching, centres, normals)
-    R = X_WB.rotation.T
+    R, facing = X_WB.rotation.T, -X_WB.rotation.T @ n_W
+    pull(chains_of(hand), row, joints, path, facing, local, iterations, marching, centres, normals)
     return Pulled(path, centres @ R + X_WB.translation, normals @ R)

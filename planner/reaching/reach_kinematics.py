@@ -6,7 +6,7 @@ import casadi as ca
 
 from hand_models.hand import Hand
 from hand_models.spheres import LinkSpheres
-from hand_models.symbolic import symbolic_joint_placements, symbolic_pads
+from hand_models.symbolic import symbolic_balls, symbolic_joint_placements, symbolic_pads
 
 LENGTH = 0.05
 """Unit of length of the optimiser's variables and rows [m]."""
@@ -41,10 +41,11 @@ def links_function(hand: Hand, spheres: LinkSpheres) -> ca.Function:
 
 
 def pads_function(hand: Hand, fingers: tuple[int, ...]) -> ca.Function:
-    """(q, base) -> (3, k) pad centres and (3, k) pad normals in the world."""
+    """(q, base, outward surface normals (3, k)) -> centres (3, k) of the balls that touch surfaces
+    of those normals as the pads do, and pad normals (3, k), in the world."""
     arguments, R, T = _base(hand)
-    centres, normals = symbolic_pads(hand, arguments[0])
-    centres, normals = centres[:, list(fingers)], normals[:, list(fingers)]
-    return ca.Function(
-        "pads", arguments, [R @ centres + ca.repmat(T, 1, len(fingers)), R @ normals]
-    )
+    q, n = arguments[0], ca.SX.sym("n", 3, len(fingers))
+    balls = symbolic_balls(hand, q, fingers, R.T @ n)
+    _, normals = symbolic_pads(hand, q)
+    centres = R @ balls + ca.repmat(T, 1, len(fingers))
+    return ca.Function("pads", [*arguments, n], [centres, R @ normals[:, list(fingers)]])

@@ -6,13 +6,16 @@ arm is to move, the way of the whole hand to the stand-off is kept clear instead
 once per set of fingers; contacts, object, base and cone are parameters.
 
     minimise    |(q - rest) / range|^2 + 0.05 |s|^2 + shortfall of both distances + price slack
-    subject to  pad centre = p + radius n                      contact, exact
-                pad centre = p + (radius + standoff) n         stand-off
-                pad centre = p + (radius - overshoot) n        overshoot
+    subject to  pad's ball at p + radius n                     contact, exact
+                pad's ball at p + (radius + standoff) n        stand-off
+                pad's ball at p + (radius - overshoot) n       overshoot
                 pad normal within the cone about -n            wider off the contact
                 distance(link sphere) >= its radius + clearance, at contact and stand-off,
                 there of what has moved
                 base turned from nominal by at most its range, q within limits
+
+A pad's ball is the one that touches a surface of normal n as the pad does (`hand_models.dome`): the
+pad itself where that is a sphere, else it goes along as the tip turns.
 
 All rows but the bounds share one slack at a high price, so that every quadratic subproblem has a
 solution: without it three in four starts stop at an inconsistent one. What slack is left where the
@@ -137,7 +140,7 @@ class ReachModel:
             postures.append((w.q_overshoot, p.radii - w.overshoot * LENGTH, p.wide_cone))
         equal, cones = [], []
         for q, away, cone in postures:
-            centres, normals = self._pads(q, *base)
+            centres, normals = self._pads(q, *base, p.normals)
             target = p.points + ca.repmat(away.T, 3, 1) * p.normals
             equal.append(ca.vec(centres - target) / LENGTH)
             cones.append((-ca.sum1(normals * p.normals) - cone).T)

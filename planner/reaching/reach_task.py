@@ -193,7 +193,8 @@ def _moved(model: ReachModel, task: ReachTask, start: Start, away: float) -> Arr
     for name, p, n in zip(start.fingers, task.points, task.normals, strict=True):
         finger = model.hand.finger(name)
         target = p + (finger.pad_radius + away) * n
-        (q,) = pulled(model.hand, finger, start.X_WB, q[None], target[None], iterations=_PULLS).path
+        way = pulled(model.hand, finger, start.X_WB, q[None], target[None], n, iterations=_PULLS)
+        q = way.path[0]
     return np.asarray(q[list(model.shape.moving)])
 
 

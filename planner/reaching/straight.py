@@ -45,7 +45,8 @@ def _way(
     finger, n = hand.finger(found.fingers[i]), task.normals[i]
     along = np.linspace(near, far, 1 + int(np.ceil(abs(far - near) / _STEP)))
     line = task.points[i] + (finger.pad_radius + along[:, None]) * n
-    way = pulled(hand, finger, found.X_WB, np.repeat(q[None], len(along), 0), line, marching=True)
+    path = np.repeat(q[None], len(along), 0)
+    way = pulled(hand, finger, found.X_WB, path, line, n, marching=True)
     off_line = np.linalg.norm(way.centres - line, axis=1)
     turned = np.arccos(np.clip(-way.normals @ n, -1.0, 1.0))
     wide = max(task.options.cone, task.options.off_contact_cone)

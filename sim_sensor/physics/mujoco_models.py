@@ -67,8 +67,14 @@ def build_models(
     Args:
         standing: None holds the object where it is.
     Raises:
-        ValueError: An object that is to stand on its end, and leans.
+        ValueError: An object that is to stand on its end, and leans; a hand whose pads are no
+            balls, as the skins here are.
     """
+    if not hand.has_balls:
+        raise ValueError(
+            f"{hand.name} has domed pads, and skins in MuJoCo are balls of gel: let it wear those,"
+            " hand.with_balls(), and plan with it"
+        )
     return Models(moving_model(hand, surface, standing), feeling_model(hand, surface, standing))
 
 

@@ -15,13 +15,14 @@ import pinocchio as pin
 
 from estimator.vectors import Array, frozen, unit
 from hand_models.hand import Finger, Hand
+from sim_sensor.viewer.meshes import hull_mesh
 from sim_sensor.viewer.scene import Camera, Scene, Track, hand_tracks, links, room
 from sim_sensor.viewer.timeline import Posture
 from sim_sensor.viewer.view import page_text, write_text
-from sim_sensor.viewer.viewer_commands import Command, set_ball, set_stick
+from sim_sensor.viewer.viewer_commands import Command, set_ball, set_mesh, set_stick
 
 PAD, NORMAL = 0xE69F00, 0x1F4FD8
-_LEGEND = (("pad, a sphere", PAD), ("pad's normal, out of the finger", NORMAL))
+_LEGEND = (("pad", PAD), ("pad's normal, out of the finger", NORMAL))
 _TURN = 3.0  # for each finger [s]
 _FRAMES = 24  # for each finger
 _SWING = 0.45  # share of each joint's range to either side of its middle
@@ -65,9 +66,13 @@ def _frames(hand: Hand) -> tuple[Posture, ...]:
 
 def _pad(finger: Finger) -> Iterator[Command]:
     """In the fingertip's frame, which the tracks move."""
-    path, centre, radius = f"/pads/{finger.name}", finger.pad_centre, finger.pad_radius
-    yield from set_ball(f"{path}/ball", centre, radius, PAD, opacity=0.55)
-    end = centre + (radius + 0.03) * finger.pad_normal
+    path, dome = f"/pads/{finger.name}", finger.dome
+    if dome.is_sphere:
+        yield from set_ball(f"{path}/ball", dome.centre, dome.radius, PAD, opacity=0.55)
+    else:
+        yield set_mesh(f"{path}/dome", hull_mesh(dome.points), PAD, opacity=0.55)
+    centre = dome.touched(finger.pad_normal)
+    end = centre + 0.03 * finger.pad_normal
     yield from set_stick(f"{path}/normal", centre, end, NORMAL, 0.0015)
 
 
@@ -108,7 +113,7 @@ def _captions(hand: Hand) -> list[dict[str, Any]]:
         normal = ", ".join(f"{c:.2f}" for c in finger.pad_normal)
         body = (
             f"moved by {', '.join(finger.joints)}\n"
-            f"pad on {finger.tip_frame}: radius {1e3 * finger.pad_radius:.1f} mm, normal ({normal})"
+            f"pad on {finger.tip_frame}: {finger.dome.in_words}, normal ({normal})"
         )
         said.append({"time": _TURN * k, "head": finger.name, "body": body})
     return said

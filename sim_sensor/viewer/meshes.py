@@ -76,13 +76,13 @@ def link_mesh(geometry: pin.GeometryObject) -> Mesh:
     """Triangles of a link's shape in its own frame; of a primitive's convex hull."""
     shape = geometry.geometry
     if not hasattr(shape, "tri_indices"):
-        return _hull_mesh(vertices(shape))
+        return hull_mesh(vertices(shape))
     triangles = (shape.tri_indices(i) for i in range(shape.num_tris))
     faces = np.array([[t[0], t[1], t[2]] for t in triangles], dtype=np.int64)
     return Mesh(frozen(shape.vertices()), faces.reshape(-1, 3))
 
 
-def _hull_mesh(points: Array) -> Mesh:
+def hull_mesh(points: Array) -> Mesh:
     """The hull's triangles, all turned outwards."""
     hull = ConvexHull(points)
     corners = points[hull.simplices]

@@ -1,0 +1,224 @@
+"""How a pad moves along its approach, and how near it is to the object: balls and domes.
+
+A ball's distance is that of its centre less its radius. A dome is a ball rolled over an ellipsoid E
+(`hand_models.dome`), so its distance is the least over all centres in E, less the ball's radius.
+The distance grows along the outward normal n, and what of E is farthest along -n is known in closed
+form: Frank and Wolfe's steps, each as long as it helps, which end at the place where a dome of that
+pose is next to the object.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+import pinocchio as pin
+
+from estimator.vectors import Array
+from hand_models.dome import Dome
+from hand_models.hand import Hand
+
+TOUCHING = 1e-10  # how far along the path a touch is known [m]
+_STEPS = 60  # of Frank and Wolfe
+_CERTAIN = 1e-9  # by what no place of the ellipsoid is nearer [m]
+_HALVINGS = 40  # of a step
+
+Distance = Callable[[Array], tuple[float, Array]]
+"""Of a point in the world to the object, negative inside [m], and the normal there, outwards."""
+
+
+class TouchPath(Protocol):
+    """What the world needs of an approach."""
+
+    @property
+    def tip_centres(self) -> Array:
+        """Centres of the pad's ball in the world, in order, straight in between, (K, 3) [m]."""
+
+    @property
+    def pad_radius(self) -> float:
+        """Radius of the pad's ball [m]."""
+
+
+@runtime_checkable
+class HandPath(TouchPath, Protocol):
+    """An approach that says what the whole hand does."""
+
+    @property
+    def finger(self) -> str:
+        """Whose pad touches."""
+
+    @property
+    def path(self) -> Array:
+        """Configurations of the hand, (K, nq)."""
+
+    @property
+    def bases(self) -> tuple[pin.SE3, ...]:
+        """Pose of the hand base for each, or one for all."""
+
+
+class Route(Protocol):
+    """A pad on its way, at places counted in the way's points with fractions."""
+
+    @property
+    def last(self) -> float:
+        """The place where it ends."""
+
+    def ball(self, at: float, distance: Distance) -> tuple[Array, float]:
+        """Centre and radius of the ball in the pad that is nearest to the object [m]."""
+
+    def moved(self, a: float, b: float) -> float:
+        """No point of the pad moves farther than that between two places [m]."""
+
+    def from_afar(self, away: Array) -> Route:
+        """The same route, with one point more that is so far off its start (3,) [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class BallRoute:
+    """A ball along a polyline.
+
+    Args:
+        centres: (K, 3) [m].
+        radius: [m].
+    """
+
+    centres: Array
+    radius: float
+
+    @property
+    def last(self) -> float:
+        return len(self.centres) - 1.0
+
+    def ball(self, at: float, distance: Distance) -> tuple[Array, float]:
+        return self._centre(at), self.radius
+
+    def moved(self, a: float, b: float) -> float:
+        return float(np.linalg.norm(self._centre(b) - self._centre(a)))
+
+    def from_afar(self, away: Array) -> BallRoute:
+        return replace(self, centres=np.vstack([self.centres[0] + away, self.centres]))
+
+    def _centre(self, at: float) -> Array:
+        i, share = _between(at, len(self.centres))
+        return np.asarray(self.centres[i] + share * (self.centres[i + 1] - self.centres[i]))
+
+
+@dataclass(frozen=True, eq=False)
+class DomeRoute:
+    """A dome on a fingertip.
+
+    Args:
+        dome: In the tip's frame.
+        tips: Poses of the tip, screws in between.
+    """
+
+    dome: Dome
+    tips: tuple[pin.SE3, ...]
+
+    @property
+    def last(self) -> float:
+        return len(self.tips) - 1.0
+
+    def ball(self, at: float, distance: Distance) -> tuple[Array, float]:
+        return nearest_centre(self.dome, self._tip(at), distance), self.dome.radius
+
+    def moved(self, a: float, b: float) -> float:
+        first, second = self._tip(a), self._tip(b)
+        turn = pin.log3(first.rotation.T @ second.rotation)
+        shift = second.act(self.dome.centre) - first.act(self.dome.centre)
+        size = self.dome.radius + np.sqrt(np.trace(self.dome.spread))
+        return float(np.linalg.norm(shift) + size * np.linalg.norm(turn))
+
+    def from_afar(self, away: Array) -> DomeRoute:
+        first = self.tips[0]
+        return replace(self, tips=(pin.SE3(first.rotation, first.translation + away), *self.tips))
+
+    def _tip(self, at: float) -> pin.SE3:
+        i, share = _between(at, len(self.tips))
+        return pin.SE3.Interpolate(self.tips[i], self.tips[i + 1], share)
+
+
+def dome_route(hand: Hand, path: HandPath) -> DomeRoute:
+    """The route of a domed pad, as the hand's own kinematics have it."""
+    finger, bases = hand.finger(path.finger), path.bases
+    every = bases if len(bases) > 1 else bases * len(path.path)
+    tips = (
+        hand.at(q, X_WB).transform_tip_to_world(finger)
+        for q, X_WB in zip(path.path, every, strict=True)
+    )
+    return DomeRoute(finger.dome, tuple(tips))
+
+
+def nearest_centre(dome: Dome, X_WT: pin.SE3, distance: Distance) -> Array:
+    """Centre, in the world, of the dome's ball that is nearest to the object, (3,) [m].
+
+    Where the object is hollow this is the nearest one downhill from the dome's middle.
+    """
+    R = X_WT.rotation
+    x = np.asarray(X_WT.act(dome.centre))
+    for _ in range(_STEPS):
+        n = distance(x)[1]
+        u = -R.T @ n
+        towards = np.asarray(X_WT.act(dome.touched(u) - dome.radius * u)) - x
+        if -n @ towards < _CERTAIN:
+            break
+        x = x + _best_share(x, towards, distance) * towards
+    return x
+
+
+def _best_share(x: Array, towards: Array, distance: Distance) -> float:
+    """Of a step, as far as the distance falls: false position on its slope, bracketed."""
+    low, high = 0.0, 1.0
+    falling, rising = (float(distance(x + s * towards)[1] @ towards) for s in (low, high))
+    if rising <= 0.0:
+        return high
+    share = 0.5
+    for k in range(_HALVINGS):
+        share = low + (high - low) * falling / (falling - rising) if k % 3 else 0.5 * (low + high)
+        slope = float(distance(x + share * towards)[1] @ towards)
+        if abs(slope) < _CERTAIN or high - low < 1e-9:
+            break
+        if slope < 0.0:
+            low, falling = share, slope
+        else:
+            high, rising = share, slope
+    return share
+
+
+def first_touch(route: Route, distance: Distance) -> float | None:
+    """Where along a route the pad first touches, in its points with fractions.
+
+    Clearance cannot change faster than the pad moves, so an interval whose end clearances add up
+    to more than its length is free. What is left is halved, the earlier half first.
+
+    Returns:
+        To within `TOUCHING` of path length; None where the route ends clear.
+    """
+
+    def clearance(at: float) -> float:
+        centre, radius = route.ball(at, distance)
+        return distance(centre)[0] - radius
+
+    gaps = [clearance(float(k)) for k in range(int(route.last) + 1)]
+    open_intervals = [(float(i), gaps[i], i + 1.0, gaps[i + 1]) for i in range(len(gaps) - 1)][::-1]
+    while open_intervals:
+        a, gap_a, b, gap_b = open_intervals.pop()
+        if gap_a <= 0:
+            return a
+        length = route.moved(a, b)
+        if gap_b > 0 and gap_a + gap_b > length:
+            continue
+        if length <= TOUCHING:
+            return b
+        middle = 0.5 * (a + b)
+        gap = clearance(middle)
+        open_intervals += [(middle, gap, b, gap_b), (a, gap_a, middle, gap)]
+    return None
+
+
+def _between(at: float, count: int) -> tuple[int, float]:
+    """The point before a place, and the share of the way to the next."""
+    i = min(int(at), count - 2)
+    return i, at - i
