@@ -28,8 +28,8 @@ BASE_UNITS = (0.1, 1.0)  # how willingly the base moves, where a joint moves by 
 LONGEST = (0.03, 0.4)  # of one step [m], [rad]
 CLOSE = 1e-6  # largest violation: done [m]
 HALF_TURN = 3.1  # beyond which a turn back has no direction [rad]
-PATIENT = 12  # steps after which one that makes things worse makes the next ones shorter ...
-LEAST_SHARE = 0.1  # ... but no shorter than this: links come near and go, domes roll to and fro
+PATIENT = 12  # steps after which, of domes, one that makes things worse makes the next ones shorter
+LEAST_SHARE = 0.1  # ... but no shorter than this: a flat dome rolls to and fro
 REFREEZE = 3  # times that limits are asked for a step
 
 
@@ -52,12 +52,12 @@ def settle(
         for j in range(k):
             middle[i] += demands.points[j, i] / k
     _turn_back(demands, R)
-    share, last = 1.0, np.inf
+    share, last, domed = 1.0, np.inf, np.any(chains.dome_radii != 0.0)
     for turn in range(iterations + 1):
         used, off = write_rows(chains, demands, q, R, p, middle, rows, residual)
         if off < CLOSE or turn == iterations:
             break
-        if turn > PATIENT and off > last:
+        if domed and turn > PATIENT and off > last:
             share = max(0.5 * share, LEAST_SHARE)
         last = off
         _step(chains, demands, q, p, rows, residual, used, system, lower, dual, free, step)
