@@ -70,8 +70,9 @@ def test_a_hand_of_coupled_joints_reaches_what_its_postures_make():
         upright = Axis(np.zeros(3), np.array([0.0, 0.0, 1.0]))
         surface = SurfaceOfRevolution(upright, cylinder(radius, 0.18))
         laid = tools.candidates(surface, 3, count=240, rng=rng)
-        place = surface.at(laid.theta[0], laid.z[0])
         solid = RevolvedSolid(pin.SE3.Identity(), np.linspace(-0.09, 0.09, 3), np.full(3, radius))
-        found = solver.solve(place.p, place.n, solid, motion="none")
-        reached += isinstance(found, Reach)
-    assert reached >= 5
+        for k in range(6):
+            place = surface.at(laid.theta[k], laid.z[k])
+            found = solver.solve(place.p, place.n, solid, motion="none")
+            reached += isinstance(found, Reach)
+    assert reached >= 30  # of 36; 92 of 96 were
