@@ -3,8 +3,8 @@
 Contacts before and after a placement of the hand are read apart, each with what was believed
 before any touch. Two axes of one object agree within their covariances, so the squared distance of
 the two in the chart is chi-square with four degrees of freedom. To that come the distances of the
-later contacts from the wall that the earlier ones led to expect, one more degree each; a shift of
-3 mm, which the first alone overlooks in one of three cases, is overlooked by both in one of eight.
+later contacts from the wall that the earlier ones led to expect, one more degree each
+(`planner.off_the_wall`).
 The fit of all contacts together is the other test: it sees what goes on within a placement, and
 less between two, where the profile gives way.
 
@@ -26,11 +26,11 @@ from estimator.belief import Belief, update
 from estimator.contact import Contact, Miss
 from estimator.estimate import Hypothesis
 from estimator.prior import AxisPrior
-from estimator.vectors import Array, basis_across, frozen
+from estimator.vectors import Array, frozen
+from planner.off_the_wall import off_the_wall
 
 FEIGNED = 10.0  # real readings fit a little worse than their model: their p-value counts so often
-ALARM = 0.01  # probability of a false alarm at a placement, by either test
-WALL = 0.7  # |n . u| beyond which a contact is not on the wall
+ALARM = 0.03  # probability of a false alarm at a placement, were all models exact
 AGREES = 0.1  # from where later touches confirm earlier ones; below, they only count
 MENTIONED = 0.01  # hypotheses that may be the right one
 RESTLESS = 3  # surprises from which the object counts as moving all the time
@@ -126,30 +126,9 @@ def motion_between(before: Belief, after: Belief, later: Sequence[Contact | Miss
     if not pairs:
         return None
     square, x = min(pairs, key=lambda pair: pair[0])
-    from_wall, count = _off_the_wall(before, contacts)
+    from_wall, count = off_the_wall(before, contacts)
     p_value = min(float(chdtrc(4 + count, square + from_wall)), FEIGNED * after.estimate.p_value)
     return Motion(float(np.hypot(*x[:2])), float(np.hypot(*x[2:])), p_value)
-
-
-def _off_the_wall(before: Belief, contacts: Sequence[Contact]) -> tuple[float, int]:
-    """Squared distance of contacts from the expected wall in its deviations, and their number."""
-    u = before.axis.direction
-    on_wall = [c for c in contacts if abs(c.normal @ u) < WALL]
-    if not on_wall:
-        return 0.0, 0
-    p = np.array([c.position for c in on_wall])
-    _, rho, z = before.surface.cylindrical(p)
-    mean, covariance = before.band.radii(z)
-    across = (p - before.axis.foot(p)) / rho[:, None] @ basis_across(u).T
-    met = np.hstack([across, z[:, None] * across])
-    expected = before.band.radii_by_axis(z)
-    # One error of the axis errs what is met and what was expected: alike on one side of the axis,
-    # against each other on two.
-    J = met - expected
-    own = covariance - expected @ before.covariance @ expected.T
-    noise = np.diag([c.noise.position**2 + c.noise.position_bias**2 for c in on_wall])
-    total = own + J @ before.covariance @ J.T + noise
-    return float((rho - mean) @ np.linalg.solve(total, rho - mean)), len(on_wall)
 
 
 def _untouched(belief: Belief) -> Belief:

