@@ -45,7 +45,7 @@ class ScipyPeer:
 
         def residuals(x: Array) -> Array:
             there = hand.at(*pose(x))
-            place = (there.pad_centres[rows] - targets).ravel()
+            place = (there.ball_centres(rows, normals) - targets).ravel()
             cosine = -np.sum(there.pad_normals[rows] * normals, axis=1)
             return np.concatenate([place, _TURN * np.maximum(np.cos(self._cone) - cosine, 0.0)])
 
@@ -138,7 +138,7 @@ def moved(X_WT: pin.SE3, finger: Any, target: Array, normal: Array, cone: float)
         axis = np.cross(n, -normal)
         axis /= max(float(np.linalg.norm(axis)), 1e-9)
         R = pin.exp3((angle - _EDGE * cone) * axis) @ R
-    return pin.SE3(R, target - R @ finger.pad_centre)
+    return pin.SE3(R, target - R @ finger.ball_along(-R.T @ normal))
 
 
 def floating(hand: Hand) -> Part:
