@@ -35,6 +35,7 @@ class CollisionShapes:
         self.outer: list[int] = []
         self.inner: list[int] = []
         self.pads: list[int] = []
+        self._in_pads: dict[int, Array] = {}
         whole = {self._add_link(hand, index) for index in range(hand.visual_model.ngeoms)}
         for finger in hand.fingers:
             self._add_pad(hand, finger, shown=pad_in_joint(hand, finger)[0] in whole)
@@ -46,6 +47,7 @@ class CollisionShapes:
         visual = hand.visual_model.geometryObjects[index]
         joint, points = int(visual.parentJoint), link_points(hand, index)
         inside = _inside_pads(hand, joint, points)
+        self._in_pads[joint] = np.vstack([self._in_pads.get(joint, points[:0]), points[inside]])
         outer = self._add_hull(visual, points[~inside])
         inner = self._add_hull(visual, points) if np.any(inside) else outer
         self.outer.extend(outer)
@@ -59,10 +61,15 @@ class CollisionShapes:
         return [_add(self.model, name, visual.parentJoint, visual.parentFrame, convex_hull(points))]
 
     def _add_pad(self, hand: Hand, finger: Finger, *, shown: bool) -> None:
-        joint, dome = pad_in_joint(hand, finger)[0], dome_in_joint(hand, finger)
-        ball = dome.is_sphere
-        at = pin.SE3(np.eye(3), dome.centre if ball else np.zeros(3))
-        shape = coal.Sphere(dome.radius) if ball else convex_hull(dome.points)
+        """A sphere; or a dome's cap, and of the tip what is in the dome behind it."""
+        joint, _, normal = pad_in_joint(hand, finger)
+        dome = dome_in_joint(hand, finger)
+        at = pin.SE3(np.eye(3), dome.centre if dome.is_sphere else np.zeros(3))
+        if dome.is_sphere:
+            shape: coal.CollisionGeometry = coal.Sphere(dome.radius)
+        else:
+            tip = self._in_pads.get(joint, dome.points[:0])
+            shape = convex_hull(np.vstack([dome.cap(normal), tip]))
         pad = _add(self.model, f"pad of {finger.name}", joint, finger.tip_frame_id, shape, at)
         self.outer.append(pad)
         self.pads.append(pad)

@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 LEAST_AXIS = 1e-3  # added to every axis, squared: no tip is so straight that it has no middle [m]
 SMALLEST, LARGEST = 3e-3, 25e-3  # radii of spheres that stand for pads [m]
 CONE = float(np.radians(40.0))  # about a pad's normal, over which they do
+CAP = float(np.radians(50.0))  # about it, over which a dome is a fingertip's
 _KINDS = ("sphere", "cylinder", "cushion", "dome")
 _AROUND = 1500  # directions that stand for all
 
@@ -100,6 +101,11 @@ class Dome:
     def points(self) -> Array:
         """(N, 3) of its surface, evenly over all directions [m]."""
         return self.touched(directions_about(np.array([0.0, 0.0, 1.0]), np.pi, _AROUND))
+
+    def cap(self, normal: Array) -> Array:
+        """(N, 3) of its surface about a normal, a little beyond where it touches [m]: behind, a
+        fingertip is not what its pad would be if it went on."""
+        return self.touched(directions_about(normal, CAP, _AROUND))
 
     def holds(self, points: Array, slack: float) -> NDArray[np.bool_]:
         """(N,) which points are in it, or out of it by no more than a slack [m]."""

@@ -30,8 +30,8 @@ _GRID = 4e-3  # between candidate centres [m]
 _SAMPLE = 2.5e-3  # mean distance of the surface points to be covered [m]
 _THINNEST = 2e-3  # a centre is at least this deep in its link [m]
 _FRONT = np.radians(20.0)  # about a pad's normal, where no overhang may stand before the pad
-_FRONTS = 300  # directions in which none may stand before a dome, which fits its tip all over
-_VERSION = 3  # of the algorithm; part of the cache's key
+_FRONTS, _BEHIND = 300, 5e-4  # directions in which none may before a dome, by so much not [m]
+_VERSION = 4  # of the algorithm; part of the cache's key
 _FIELDS = ("joints", "centres", "radii", "link_indices", "finger_indices", "is_pad")
 
 
@@ -144,17 +144,24 @@ class _Pad:
     normal: Array
 
     def covers(self, points: Array, slack: float) -> NDArray[np.bool_]:
-        """Which points are in the pad, or out of it by no more than a slack."""
-        if not self.dome.is_sphere:
-            return self.dome.holds(points, slack)
+        """Which points are left to the pad's own sphere; a dome's tip is covered like any link."""
         off = np.linalg.norm(points - self.dome.centre, axis=1)
-        return np.asarray(off <= self.dome.radius + slack)
+        return np.asarray((off <= self.dome.radius + slack) & self.dome.is_sphere)
 
-    def room(self, points: Array) -> Array:
-        """Largest radii with which spheres stay behind the planes the pad is to touch."""
-        if not self.dome.is_sphere:
-            u = directions_about(self.normal, CONE, _FRONTS)
-            return np.asarray((self.dome.heights(u) - points @ u.T).min(axis=1))
+    def bounded(self, radii: Array, centres: Array, depth: Array) -> Array:
+        """Radii no larger than lets spheres stay behind the planes that the pad is to touch.
+
+        Args:
+            depth: Of the centres in their link [m].
+        """
+        if self.dome.is_sphere:
+            return np.minimum(radii, np.maximum(depth, self._room(centres)))
+        u = directions_about(self.normal, CONE, _FRONTS)
+        room = (self.dome.heights(u) - centres @ u.T).min(axis=1)
+        return np.asarray(np.clip(room - _BEHIND, 1e-4, radii))
+
+    def _room(self, points: Array) -> Array:
+        """Of spheres behind the planes that a ball touches within a cone about its normal."""
         offset = points - self.dome.centre
         length = np.maximum(np.linalg.norm(offset, axis=1), 1e-9)
         angle = np.arccos(np.clip(offset @ self.normal / length, -1.0, 1.0))
@@ -175,7 +182,7 @@ def _cover_link(
     deep = depth > min(_THINNEST, 0.5 * float(depth.max()))
     centres, depth, radii = centres[deep], depth[deep], depth[deep] + overhang
     if pad is not None:
-        radii = np.minimum(radii, np.maximum(depth, pad.room(centres)))
+        radii = pad.bounded(radii, centres, depth)
     distance = np.linalg.norm(surface[:, None] - centres, axis=2)
     chosen = _greedy_cover(distance <= radii + slack)
     return centres[chosen], radii[chosen]

@@ -15,7 +15,7 @@ import numpy as np
 
 from estimator.belief import Belief
 from estimator.contact import Contact
-from estimator.vectors import Array, basis_across
+from estimator.vectors import Array, Index, basis_across
 
 WALL = 0.7  # |n . u| beyond which a contact is not on the wall
 FEATURE_SD = 0.1  # of the wall's own features, over the radius [-]
@@ -71,10 +71,10 @@ def features(before: Belief, z: Array) -> Array:
 def _square(off: Array, covariance: Array) -> float:
     """Mahalanobis' square, of which the contact that disagrees most adds `ODDEST` at most."""
 
-    def of(kept: Array) -> float:
+    def of(kept: Index) -> float:
         part = covariance[np.ix_(kept, kept)]
         return float(off[kept] @ np.linalg.solve(part, off[kept]))
 
-    every = np.arange(len(off))
+    every = np.arange(len(off), dtype=np.intp)
     others = min(of(np.delete(every, k)) for k in every)
     return min(of(every), others + ODDEST)

@@ -70,7 +70,7 @@ def _pad(finger: Finger) -> Iterator[Command]:
     if dome.is_sphere:
         yield from set_ball(f"{path}/ball", dome.centre, dome.radius, PAD, opacity=0.55)
     else:
-        yield set_mesh(f"{path}/dome", hull_mesh(dome.points), PAD, opacity=0.55)
+        yield set_mesh(f"{path}/dome", hull_mesh(dome.cap(finger.pad_normal)), PAD, opacity=0.55)
     centre = dome.touched(finger.pad_normal)
     end = centre + 0.03 * finger.pad_normal
     yield from set_stick(f"{path}/normal", centre, end, NORMAL, 0.0015)
