@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 
 _VERSION = 4  # of the sampling and the rules of collision; part of the cache's key
 _FIELDS = ("q", "pad_centres", "pad_normals")
+_APART = 2e-3  # of links where a hand is to begin [m]
 _DRAWS_PER_POSTURE = 50  # a hand that is free of itself in fewer than 2 % of draws is misdescribed
 
 
@@ -59,6 +60,27 @@ def posture_library(hand: Hand, *, count: int = 12_000, seed: int = 0) -> Postur
     for array in arrays.values():
         array.setflags(write=False)
     return Postures(*(arrays[name].astype(np.float64, copy=False) for name in _FIELDS))
+
+
+def start_posture(hand: Hand) -> Array:
+    """Where a hand can begin, (nq,): its home, or the nearest posture whose links are apart.
+
+    In mid-range some hands meet themselves (Psyonic's thumb its index finger). The library is
+    looked through by the farthest joint, as a share of its range; an arm stays at home.
+
+    Raises:
+        HandError: The hand collides with itself in nearly every posture.
+    """
+    if hand.arm is not None:
+        return hand.arm.joined(hand.arm.home, start_posture(hand.arm.hand))
+    collision, home = HandCollision(hand), hand.home
+    if collision.self_clearance(home).distance > 0.0:
+        return home
+    q = posture_library(hand).q
+    nearest = np.argsort(np.max(np.abs(q - home) / (hand.upper - hand.lower), axis=1))
+    gaps = (collision.self_clearance(q[k]).distance for k in nearest)
+    first = next((k for k, gap in enumerate(gaps) if gap > _APART), 0)
+    return np.asarray(q[nearest[first]])
 
 
 def _draw(hand: Hand, count: int, rng: np.random.Generator) -> dict[str, NDArray[np.generic]]:

@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from hand_models.hand import Hand
+from hand_models.postures import start_posture
 from planner.carrying import Stop
 from planner.explore import Step
 from planner.grasping.grasp import Grasp
@@ -32,7 +33,7 @@ def from_home(hand: Hand, options: PlannerOptions) -> PlannerOptions:
     arm where that begins."""
     nominal = within_wrist(hand, options.reach).workspace.X_WB
     X_WB = hand.arm.X_WA if hand.arm is not None else HOME if nominal is None else nominal
-    return replace(options, start=Configuration(hand.home, X_WB))
+    return replace(options, start=Configuration(start_posture(hand), X_WB))
 
 
 def unconfirmed_by(steps: Sequence[Step]) -> str | None:

@@ -10,7 +10,7 @@ import pytest
 from hand_models.cache import cache_directory, cached_arrays, hand_fingerprint
 from hand_models.collision import HandCollision
 from hand_models.hand import Hand, load_hand
-from hand_models.postures import Postures, posture_library
+from hand_models.postures import Postures, posture_library, start_posture
 
 
 @pytest.fixture(scope="module")
@@ -108,3 +108,16 @@ def test_the_cache_folder_follows_the_platform(monkeypatch: pytest.MonkeyPatch) 
 def test_an_empty_library_is_refused(hand: Hand) -> None:
     with pytest.raises(ValueError, match="count must be at least 1"):
         posture_library(hand, count=0)
+
+
+@pytest.mark.parametrize("name", ["psyonic_right", "allegro_right", "allegro_right_ur5"])
+def test_a_hand_begins_where_its_links_are_apart_and_near_home(name: str) -> None:
+    """Psyonic's thumb meets its index finger in mid-range, by 2.8 mm."""
+    hand = load_hand(name)
+    collision, start = HandCollision(hand), start_posture(hand)
+    assert collision.self_clearance(start).distance > 1e-3
+    assert np.max(np.abs(start - hand.home) / (hand.upper - hand.lower)) < 0.1
+    if collision.self_clearance(hand.home).distance > 0.0:
+        np.testing.assert_array_equal(start, hand.home)
+    else:
+        assert name == "psyonic_right"

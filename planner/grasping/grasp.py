@@ -115,7 +115,11 @@ def _ranked(
     """Candidates of all numbers of fingers, best first, and what refused the others."""
     ranked: list[_Ranked] = []
     funnel: Funnel = ()
-    for count in options.fingers:
+    has = len(tools.hand.fingers)
+    counts = [count for count in options.fingers if count <= has]
+    if not counts:
+        raise ValueError(f"fingers: {tools.hand.name} has {has}, asked for {options.fingers}")
+    for count in counts:
         found, told = _with_fingers(tools, surface, bodies, options, count, rng)
         ranked += found
         funnel += tuple((f"{count} fingers: {reason}", n) for reason, n in told)
@@ -130,8 +134,6 @@ def _with_fingers(
     count: int,
     rng: np.random.Generator,
 ) -> tuple[list[_Ranked], Funnel]:
-    if count > len(tools.hand.fingers):
-        raise ValueError(f"fingers: {tools.hand.name} has {len(tools.hand.fingers)}, not {count}")
     laid = tools.candidates(
         _bounded(surface, options.heights), count, count=options.placements, rng=rng
     )

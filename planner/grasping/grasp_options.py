@@ -20,7 +20,7 @@ class GraspOptions:
     """How a grasp is planned.
 
     Args:
-        fingers: How many may hold; each number is tried, the better grasp taken.
+        fingers: How many may hold; each number that the hand has is tried, the better grasp taken.
         heights: Lowest and highest contact along the believed axis, from its point [m]; None is
             all of the object but its ends.
         friction: What a contact can hold.
