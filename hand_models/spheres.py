@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
+from scipy.spatial.distance import cdist
 
 from hand_models.batch import BatchPlacements, IntArray
 from hand_models.cache import cached_arrays, hand_fingerprint
@@ -183,8 +184,7 @@ def _cover_link(
     centres, depth, radii = centres[deep], depth[deep], depth[deep] + overhang
     if pad is not None:
         radii = pad.bounded(radii, centres, depth)
-    distance = np.linalg.norm(surface[:, None] - centres, axis=2)
-    chosen = _greedy_cover(distance <= radii + slack)
+    chosen = _greedy_cover(cdist(surface, centres) <= radii + slack)
     return centres[chosen], radii[chosen]
 
 
