@@ -14,7 +14,7 @@ from estimator.contact import Contact, Miss
 from estimator.estimate import AxisEstimate, Hypothesis
 from estimator.fusion import estimate_axis
 from estimator.prior import AxisPrior
-from estimator.profile_readings import profile_readings
+from estimator.profile_readings import ProfileReadings, profile_readings
 from estimator.surface import SurfaceOfRevolution
 from estimator.vectors import Array, frozen
 
@@ -145,12 +145,27 @@ def _with_sense(hypothesis: Hypothesis, reference: Axis) -> Hypothesis:
 def _touched_band(
     band: ProfileBand, estimate: AxisEstimate, hypothesis: Hypothesis, contacts: tuple[Contact, ...]
 ) -> ProfileBand:
-    """The band about the likeliest axis; a contact that is grossly wrong tells nothing of it."""
+    """The band about the likeliest axis."""
+    return band.conditioned(_readings(estimate, hypothesis, contacts))
+
+
+def wall_readings(belief: Belief) -> ProfileReadings:
+    """What a belief's contacts told of its band: those on the wall that are not grossly wrong.
+
+    Raises:
+        ValueError: Nothing was touched.
+    """
+    if belief.estimate is None:
+        raise ValueError("nothing was touched, so nothing was told of the wall")
+    return _readings(belief.estimate, belief.hypotheses[0], belief.contacts)
+
+
+def _readings(
+    estimate: AxisEstimate, hypothesis: Hypothesis, contacts: tuple[Contact, ...]
+) -> ProfileReadings:
     right = np.nonzero(estimate.gross_errors < 0.5)[0]
     kept = replace(hypothesis, parallel_rows=frozen(hypothesis.parallel_rows[right]))
-    return band.conditioned(
-        profile_readings([contacts[i] for i in right], kept, estimate.nuisances)
-    )
+    return profile_readings([contacts[i] for i in right], kept, estimate.nuisances)
 
 
 def _beside_wall(miss: Miss, belief: Belief) -> bool:

@@ -121,8 +121,9 @@ class Miss:
     """A finger went all the way along its approach and met nothing.
 
     Args:
-        tip: Centre of the pad's sphere where the approach ended, world [m], shape (3,).
-        radius: Of the pad's sphere [m]: the object is farther than this from `tip`.
+        tip: Centre of the pad's sphere where the approach ended, world [m], shape (3,); of another
+            pad, of a ball in it.
+        radius: Of that sphere [m]: the object is farther than this from `tip`.
     """
 
     tip: Array

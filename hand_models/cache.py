@@ -51,7 +51,8 @@ def hand_fingerprint(hand: Hand, *settings: object) -> str:
         digest.update(np.ascontiguousarray(vertices(shape.geometry)).tobytes())
     for finger in hand.fingers:
         pad = (*finger.pad_centre.tolist(), *finger.pad_normal.tolist(), finger.pad_radius)
-        pad += tuple(finger.dome.axes.ravel().tolist())
+        if not finger.dome.is_sphere:
+            pad += (*finger.dome.centre.tolist(), finger.dome.radius, *finger.dome.axes.ravel())
         digest.update(repr((finger.name, finger.tip_frame, finger.joints, pad)).encode())
     digest.update(repr(settings).encode())
     return digest.hexdigest()[:24]

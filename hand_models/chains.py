@@ -81,7 +81,7 @@ def chains_of(hand: Hand) -> Chains:
         dome_centres=np.array([dome.centre for dome in domes]),
         dome_spreads=np.array([dome.spread for dome in domes]),
         dome_radii=np.array(
-            [dome.radius - f.pad_radius for dome, f in zip(domes, hand.fingers, strict=True)]
+            [dome.ball - f.pad_radius for dome, f in zip(domes, hand.fingers, strict=True)]
         ),
         supports=_supports(hand, joints),
     )

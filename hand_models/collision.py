@@ -1,7 +1,8 @@
 """The final check: exact distances between convex hulls, by coal.
 
-Every visual mesh is replaced by its convex hull. Towards an object every pad is its sphere, and
-what a tip's mesh shows inside that sphere is dropped, so that a tip is round where it touches.
+Every visual mesh is replaced by its convex hull. Towards an object every pad is its sphere or the
+front of its dome, and what a tip's mesh shows in there is dropped, so that a tip is round where it
+touches.
 Towards other links a tip is its whole hull: a sphere that fits the front of a slim tip stands out
 of its sides. The optimiser works on other shapes (`hand_models.spheres`), so this check is
 independent of it.

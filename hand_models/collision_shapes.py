@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from hand_models.geometry import dome_in_joint, link_points, pad_in_joint
+from hand_models.geometry import dome_in_joint, link_points, pad_in_joint, points_moved_by
 from hand_models.hand import Finger, Hand, HandError
 
 Array = NDArray[np.float64]
@@ -35,7 +35,6 @@ class CollisionShapes:
         self.outer: list[int] = []
         self.inner: list[int] = []
         self.pads: list[int] = []
-        self._in_pads: dict[int, Array] = {}
         whole = {self._add_link(hand, index) for index in range(hand.visual_model.ngeoms)}
         for finger in hand.fingers:
             self._add_pad(hand, finger, shown=pad_in_joint(hand, finger)[0] in whole)
@@ -47,7 +46,6 @@ class CollisionShapes:
         visual = hand.visual_model.geometryObjects[index]
         joint, points = int(visual.parentJoint), link_points(hand, index)
         inside = _inside_pads(hand, joint, points)
-        self._in_pads[joint] = np.vstack([self._in_pads.get(joint, points[:0]), points[inside]])
         outer = self._add_hull(visual, points[~inside])
         inner = self._add_hull(visual, points) if np.any(inside) else outer
         self.outer.extend(outer)
@@ -61,15 +59,16 @@ class CollisionShapes:
         return [_add(self.model, name, visual.parentJoint, visual.parentFrame, convex_hull(points))]
 
     def _add_pad(self, hand: Hand, finger: Finger, *, shown: bool) -> None:
-        """A sphere; or a dome's cap, and of the tip what is in the dome behind it."""
+        """A sphere; or a dome's front with what of its tip is there."""
         joint, _, normal = pad_in_joint(hand, finger)
         dome = dome_in_joint(hand, finger)
         at = pin.SE3(np.eye(3), dome.centre if dome.is_sphere else np.zeros(3))
         if dome.is_sphere:
             shape: coal.CollisionGeometry = coal.Sphere(dome.radius)
         else:
-            tip = self._in_pads.get(joint, dome.points[:0])
-            shape = convex_hull(np.vstack([dome.cap(normal), tip]))
+            tip = points_moved_by(hand, joint)
+            front = dome.cap(normal) if len(tip) else dome.points
+            shape = convex_hull(np.vstack([front, tip[dome.fronts(tip, normal, _ON_DOME)]]))
         pad = _add(self.model, f"pad of {finger.name}", joint, finger.tip_frame_id, shape, at)
         self.outer.append(pad)
         self.pads.append(pad)
@@ -84,16 +83,17 @@ def shapes_of(hand: Hand) -> CollisionShapes:
 
 
 def _inside_pads(hand: Hand, joint: int, points: Array) -> NDArray[np.bool_]:
-    """(N,) which of a joint's points lie in a pad's sphere."""
+    """(N,) which of a joint's points are its pads' own."""
     inside = np.zeros(len(points), dtype=np.bool_)
     for finger in hand.fingers:
+        at, _, normal = pad_in_joint(hand, finger)
         dome = dome_in_joint(hand, finger)
-        if pad_in_joint(hand, finger)[0] != joint:
+        if at != joint:
             continue
         if dome.is_sphere:
             inside |= np.linalg.norm(points - dome.centre, axis=1) <= 1.01 * dome.radius
         else:
-            inside |= dome.holds(points, _ON_DOME)
+            inside |= dome.fronts(points, normal, _ON_DOME)
     return inside
 
 

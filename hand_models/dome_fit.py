@@ -38,7 +38,7 @@ def fit_dome(u: Array, heights: Array, sphere: Dome) -> Dome:
         least_squares(misfit, start, bounds=(low, high), x_scale=1e-3) for start in _starts(sphere)
     ]
     best = min(fits, key=lambda fit: float(fit.cost)).x
-    return Dome(np.asarray(best[:3]), float(best[3]), _axes(_root(best)))
+    return Dome(best[:3], float(best[3]) + LEAST_AXIS, _axes(_root(best)))
 
 
 def _starts(sphere: Dome) -> list[Array]:

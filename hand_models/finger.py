@@ -60,6 +60,4 @@ class Finger:
 
     @cached_property
     def _sphere(self) -> tuple[Array, float]:
-        centre, radius = self.dome.sphere_about(self.pad_normal)
-        centre.setflags(write=False)
-        return centre, radius
+        return self.dome.sphere_about(self.pad_normal)

@@ -27,7 +27,8 @@ class Postures:
 
     Attributes:
         q: (N, nq) joint positions [rad], [m] if prismatic.
-        pad_centres: (N, F, 3) centres of the pads in the hand base frame B [m].
+        pad_centres: (N, F, 3) centres of the spheres that stand for the pads, in the hand base
+            frame B [m].
         pad_normals: (N, F, 3) unit vectors out of the pads, in B.
     """
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from hand_models.dome import LEAST_AXIS
 from hand_models.fields import HandError
 from hand_models.geometry import link_points, pad_in_joint, points_moved_by
 
@@ -22,6 +23,7 @@ SMALLEST_HAND, LARGEST_HAND = 0.02, 3.0  # farthest pad from the base of the fir
 SMALLEST_LINK, LARGEST_LINK = 1e-3, 1.0  # extent of a link's mesh [m]
 SMALLEST_PAD, LARGEST_PAD = 5e-4, 0.1  # radii [m]
 _LEAST_MOVE = 1e-3  # of a pad per radian of all its joints together [m]
+_ASKEW = 0.1  # cosine between axes of a dome
 _OFF_LINK = 0.05  # of a pad from its link's mesh [m]
 _POSTURES = 8
 
@@ -36,6 +38,7 @@ def check_sense(hand: Hand) -> None:
     for index in range(hand.visual_model.ngeoms):
         _check_link(hand, index)
     for finger in hand.fingers:
+        _check_dome(finger)
         _check_size(hand, finger)
         _check_motion(hand, finger)
         _check_place(hand, finger)
@@ -58,12 +61,6 @@ def _check_size(hand: Hand, finger: Finger) -> None:
             f"finger '{finger.name}': pad_radius is {radius:g} m{_units(radius)}: expected"
             f" {SMALLEST_PAD:g} to {LARGEST_PAD:g} m"
         )
-    longest = float(np.linalg.norm(finger.dome.axes, axis=1).max(initial=0.0))
-    if not longest < LARGEST_PAD:
-        raise HandError(
-            f"finger '{finger.name}': an axis of pad_axes is {longest:g} m long{_units(longest)}:"
-            f" expected less than {LARGEST_PAD:g} m"
-        )
     pose = hand.at(hand.middle)
     centre = pose.pad_centres[hand.fingers.index(finger)]
     first = pose.data.oMi[hand.model.getJointId(finger.joints[0])].translation
@@ -72,6 +69,26 @@ def _check_size(hand: Hand, finger: Finger) -> None:
         raise HandError(
             f"finger '{finger.name}' is {reach:.3g} m long from its first joint to its pad"
             f"{_units(reach)}: lengths are metres, and links have some"
+        )
+
+
+def _check_dome(finger: Finger) -> None:
+    """Axes of a size, at right angles, and a ball thick enough to take the least axis from."""
+    dome, where = finger.dome, f"finger '{finger.name}'"
+    lengths = np.linalg.norm(dome.axes, axis=1)
+    for length in lengths:
+        if not SMALLEST_PAD <= length < LARGEST_PAD:
+            raise HandError(
+                f"{where}: an axis of pad_axes is {length:g} m long{_units(length)}: expected"
+                f" {SMALLEST_PAD:g} to {LARGEST_PAD:g} m"
+            )
+    cosines = np.abs(dome.axes @ dome.axes.T / np.outer(lengths, lengths)) - np.eye(len(lengths))
+    if np.max(cosines, initial=0.0) > _ASKEW:
+        raise HandError(f"{where}: pad_axes must be at right angles to each other")
+    if not dome.is_sphere and dome.radius < 2.0 * LEAST_AXIS:
+        raise HandError(
+            f"{where}: pad_radius is {dome.radius:g} m: with pad_axes, at least"
+            f" {2.0 * LEAST_AXIS:g} m"
         )
 
 

@@ -31,8 +31,9 @@ _GRID = 4e-3  # between candidate centres [m]
 _SAMPLE = 2.5e-3  # mean distance of the surface points to be covered [m]
 _THINNEST = 2e-3  # a centre is at least this deep in its link [m]
 _FRONT = np.radians(20.0)  # about a pad's normal, where no overhang may stand before the pad
-_FRONTS, _BEHIND = 300, 5e-4  # directions in which none may before a dome, by so much not [m]
-_VERSION = 4  # of the algorithm; part of the cache's key
+_FRONTS = 300  # directions in which a sphere has to stay behind a dome, ...
+_BEHIND = 5e-4  # ... by so much [m]
+_VERSION = 5  # of the algorithm; part of the cache's key
 _FIELDS = ("joints", "centres", "radii", "link_indices", "finger_indices", "is_pad")
 
 
@@ -46,7 +47,7 @@ class LinkSpheres:
         radii: (M,) [m].
         links: M names of the links (frames) covered.
         finger_indices: (M,) which of the hand's fingers has its pad on the same joint, else -1.
-        is_pad: (M,) whether the sphere is the pad itself, of the pad's own radius.
+        is_pad: (M,) whether the sphere is a pad, or stands for one that is a dome.
         overhang: Largest distance by which a sphere stands out of its link's hull [m].
         slack: Largest distance by which a hull stands out of the spheres [m].
     """
@@ -123,7 +124,7 @@ def _cover_hand(hand: Hand, overhang: float, slack: float) -> dict[str, NDArray[
     for index, shape in enumerate(hand.visual_model.geometryObjects):
         joint, points = int(shape.parentJoint), link_points(hand, index)
         pad = pads.get(joint)
-        key = points.tobytes() + (b"" if pad is None else pad.dome.centre.tobytes())
+        key = points.tobytes() + (b"" if pad is None else pad.key)
         if key not in done:
             done[key] = _cover_link(points, overhang, slack, pad)
         for centre, radius in zip(*done[key], strict=True):
@@ -143,6 +144,12 @@ class _Pad:
     finger_index: int
     dome: Dome
     normal: Array
+
+    @property
+    def key(self) -> bytes:
+        """All that a cover depends on."""
+        radius, axes = np.array([self.dome.radius]), self.dome.axes
+        return b"".join(x.tobytes() for x in (self.dome.centre, axes, radius, self.normal))
 
     def covers(self, points: Array, slack: float) -> NDArray[np.bool_]:
         """Which points are left to the pad's own sphere; a dome's tip is covered like any link."""

@@ -125,7 +125,7 @@ def _ball(finger: Finger, u: ca.SX) -> ca.SX:
     along = ca.SX(dome.spread) @ u
     return (
         ca.SX(dome.centre) + along / ca.sqrt(ca.dot(u, along))
-        + (dome.radius - finger.pad_radius) * u
+        + (dome.ball - finger.pad_radius) * u
     )  # fmt: skip
 
 

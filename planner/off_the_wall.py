@@ -13,14 +13,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from estimator.belief import Belief
+from estimator.belief import Belief, wall_readings
 from estimator.contact import Contact
+from estimator.profile_readings import ProfileReadings
 from estimator.vectors import Array, Index, basis_across
 
 WALL = 0.7  # |n . u| beyond which a contact is not on the wall
 FEATURE_SD = 0.1  # of the wall's own features, over the radius [-]
 FEATURE_LENGTH = 0.1  # of those, over the height [-]
-TOLD = (2e-4, 0.05)  # errors of a radius and a slope that a contact told of [m], [-]
+TOLD = (2e-4, 0.05)  # least errors of a radius and a slope that a contact told of [m], [-]
 ODDEST = 9.0  # squared distance that one contact adds at most
 
 
@@ -47,10 +48,10 @@ def off_the_wall(before: Belief, contacts: Sequence[Contact]) -> tuple[float, in
 def features(before: Belief, z: Array) -> Array:
     """Covariance of what the wall may have at heights z (m,) beside its band, (m, m) [m^2].
 
-    Zero at heights that were touched, and all of it a tenth of the object's height away.
+    Next to nothing at heights that told the band of radius and slope, nearly all of it three tenths
+    of the object's height away.
     """
-    touched = np.array([c.position for c in before.contacts])
-    Z = before.surface.cylindrical(touched)[2]
+    told = wall_readings(before)
     sd = FEATURE_SD * float(np.mean(before.band.mean))
     length = FEATURE_LENGTH * float(np.ptp(before.band.z))
 
@@ -61,11 +62,20 @@ def features(before: Belief, z: Array) -> Array:
         """Of radii at a with slopes at b."""
         return radius(a, b) * (a[:, None] - b) / length**2
 
+    Z = told.z
     slopes = radius(Z, Z) * (1.0 - ((Z[:, None] - Z) / length) ** 2) / length**2
-    told = np.block([[radius(Z, Z), slope(Z, Z)], [slope(Z, Z).T, slopes]])
-    told += np.diag(np.repeat(TOLD, len(Z)) ** 2)
+    read = np.block([[radius(Z, Z), slope(Z, Z)], [slope(Z, Z).T, slopes]])
+    read += np.diag(_errors(before, told) ** 2)
     known = np.hstack([radius(z, Z), slope(z, Z)])
-    return np.asarray(radius(z, z) - known @ np.linalg.solve(told, known.T))
+    return np.asarray(radius(z, z) - known @ np.linalg.solve(read, known.T))
+
+
+def _errors(before: Belief, told: ProfileReadings) -> Array:
+    """Sd of each radius and slope that was told, the axis' share left out, (2 k,) [m], [-]."""
+    own = told.covariance - told.by_axis @ before.hypotheses[0].covariance @ told.by_axis.T
+    k = len(told.z)
+    sd = np.sqrt(np.maximum(np.diag(own)[: 2 * k], 0.0))
+    return np.asarray(np.maximum(sd, np.repeat(TOLD, k)))
 
 
 def _square(off: Array, covariance: Array) -> float:

@@ -219,11 +219,10 @@ class _Session:
         """Errors after one more placement, felt by the same sensor in a session of its own."""
         options = PlannerOptions(criterion=ARMS[self.job.arm], certify=False, margin=0.0)
         rng = np.random.default_rng([self.job.seed, 2])
-        aside = replace(self, world=World(self.surface, self.session, rng=rng))
+        hand = _hand(self.job.hand)
+        aside = replace(self, world=World(self.surface, self.session, rng=rng, hand=hand))
         with suppress(NoPlan):
-            plan = plan_probes(
-                _hand(self.job.hand), belief, self.told, goal=GOAL, rng=rng, options=options
-            )
+            plan = plan_probes(hand, belief, self.told, goal=GOAL, rng=rng, options=options)
             return self._errors(update(belief, [aside._touch(probe) for probe in plan.probes]))
         return np.nan, np.nan
 

@@ -69,7 +69,11 @@ class Route(Protocol):
         """Centre and radius of the ball in the pad that is nearest to the object [m]."""
 
     def moved(self, a: float, b: float) -> float:
-        """No point of the pad moves farther than that between two places [m]."""
+        """No point of the pad moves farther than that between two places of one interval [m]."""
+
+    @property
+    def size(self) -> float:
+        """No point of the pad is farther from its middle [m]."""
 
     def from_afar(self, away: Array) -> Route:
         """The same route, with one point more that is so far off its start (3,) [m]."""
@@ -97,6 +101,10 @@ class BallRoute:
     def moved(self, a: float, b: float) -> float:
         return float(np.linalg.norm(self._centre(b) - self._centre(a)))
 
+    @property
+    def size(self) -> float:
+        return self.radius
+
     def from_afar(self, away: Array) -> BallRoute:
         return replace(self, centres=np.vstack([self.centres[0] + away, self.centres]))
 
@@ -122,14 +130,17 @@ class DomeRoute:
         return len(self.tips) - 1.0
 
     def ball(self, at: float, distance: Distance) -> tuple[Array, float]:
-        return nearest_centre(self.dome, self._tip(at), distance), self.dome.radius
+        return nearest_centre(self.dome, self._tip(at), distance), self.dome.ball
 
     def moved(self, a: float, b: float) -> float:
-        first, second = self._tip(a), self._tip(b)
-        turn = pin.log3(first.rotation.T @ second.rotation)
-        shift = second.act(self.dome.centre) - first.act(self.dome.centre)
-        size = self.dome.radius + np.sqrt(np.trace(self.dome.spread))
-        return float(np.linalg.norm(shift) + size * np.linalg.norm(turn))
+        i = min(int(a), len(self.tips) - 2)  # a and b lie between the same two points
+        twist = pin.log6(self.tips[i].actInv(self.tips[i + 1]))
+        speed = np.linalg.norm(twist.linear + np.cross(twist.angular, self.dome.centre))
+        return float((b - a) * (speed + self.dome.reach * np.linalg.norm(twist.angular)))
+
+    @property
+    def size(self) -> float:
+        return self.dome.reach
 
     def from_afar(self, away: Array) -> DomeRoute:
         first = self.tips[0]
@@ -161,7 +172,7 @@ def nearest_centre(dome: Dome, X_WT: pin.SE3, distance: Distance) -> Array:
     for _ in range(_STEPS):
         n = distance(x)[1]
         u = -R.T @ n
-        towards = np.asarray(X_WT.act(dome.touched(u) - dome.radius * u)) - x
+        towards = np.asarray(X_WT.act(dome.touched(u) - dome.ball * u)) - x
         if -n @ towards < _CERTAIN:
             break
         x = x + _best_share(x, towards, distance) * towards

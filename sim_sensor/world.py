@@ -120,7 +120,7 @@ class World:
         route = self._route(path)
         centre, radius = route.ball(0.0, self._distance)
         overlap = radius - self.signed_distance(centre)
-        afar = route.from_afar(self._away(path)) if overlap > 0 else route
+        afar = route.from_afar(self._away(path, route)) if overlap > 0 else route
         stop = first_touch(afar, self._distance)
         if stop is None:
             tip, radius = route.ball(route.last, self._distance)
@@ -185,12 +185,12 @@ class World:
             return nearest.distance, self._geometry(point_W, nearest).n
         return nearest.distance, unit(point_W - place) * np.sign(nearest.distance)
 
-    def _away(self, path: TouchPath) -> Array:
+    def _away(self, path: TouchPath, route: Route) -> Array:
         """From the path's start back to where the pad is clear of the object."""
         steps = np.diff(path.tip_centres, axis=0)
         first = steps[np.argmax(np.linalg.norm(steps, axis=1) > TOUCHING)]
         low, high = self.surface.profile.z_range
-        reach = 2.0 * self._solid.largest_radius + (high - low) + 2.0 * path.pad_radius
+        reach = 2.0 * self._solid.largest_radius + (high - low) + 2.0 * route.size
         return np.asarray(-reach * unit(first))
 
 

@@ -11,10 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hand_models import load_hand
+from hand_models.cache import hand_fingerprint
 from hand_models.chains import chains_of
 from hand_models.dome import LEAST_AXIS, Dome, directions_about
 from hand_models.dome_fit import fit_dome
 from hand_models.pads import fit_pad, pad_bulges, refined
+from hand_models.spheres import link_spheres
 from hand_models.symbolic import symbolic_balls
 from planner.kinematics.placing import ball_jacobian, place_ball, place_joints
 
@@ -37,7 +39,7 @@ def points_of(dome: Dome) -> np.ndarray:
     unit = directions_about(UP, np.pi, 400)
     values, vectors = np.linalg.eigh(dome.spread)
     ellipsoid = unit @ (vectors * np.sqrt(values)).T
-    return (dome.centre + ellipsoid[:, None] + dome.radius * unit).reshape(-1, 3)
+    return (dome.centre + ellipsoid[:, None] + dome.ball * unit).reshape(-1, 3)
 
 
 @pytest.mark.parametrize("dome", [SPHERE, CYLINDER, DOME])
@@ -50,8 +52,9 @@ def test_it_touches_where_it_reaches_farthest(dome, azimuth, height):
     farthest = (points_of(dome) @ u).max()
     assert farthest <= u @ x + 1e-12  # nothing of it is beyond
     assert farthest > u @ x - 3e-4  # and something nearly there: 400 directions
-    assert dome.holds(x[None], 1e-9)[0]
-    assert not dome.holds((x + 1e-3 * u)[None], 2e-4)[0]
+    assert dome.fronts(x[None], u, 1e-9)[0]
+    assert not dome.fronts(x[None], -u, 1e-9)[0]
+    assert not dome.fronts((x + 1e-3 * u)[None], u, 2e-4)[0]
 
 
 @pytest.mark.parametrize("dome", [SPHERE, CYLINDER, DOME])
@@ -72,10 +75,10 @@ def test_a_cylinder_on_a_plane_has_a_place_all_the_same():
     a = CYLINDER.axes[0]
     along = a / np.linalg.norm(a)
     flat = np.array([along[1], -along[0], 0.0])
-    lift = LEAST_AXIS * flat + 0.008 * flat
-    np.testing.assert_allclose(CYLINDER.touched(flat), CENTRE + lift, atol=1e-12)
+    np.testing.assert_allclose(CYLINDER.touched(flat), CENTRE + 0.008 * flat, atol=1e-12)
+    assert CYLINDER.ball == 0.008 - LEAST_AXIS
     tilted = np.cos(0.3) * flat + np.sin(0.3) * along
-    off = (CYLINDER.touched(tilted) - CENTRE - 0.008 * tilted) @ along
+    off = (CYLINDER.touched(tilted) - CENTRE - CYLINDER.ball * tilted) @ along
     assert off == pytest.approx(np.linalg.norm(a), rel=0.1)
 
 
@@ -96,11 +99,8 @@ def test_a_dome_is_found_from_its_points(dome):
 def test_shipped_domes_are_those_of_the_meshes(name):
     """Spheres that stand for them from afar would be wrong by millimetres at the cone's edge."""
     hand = load_hand(name)
-    spheres = tuple(
-        replace(f, dome=Dome(f.pad_centre, f.pad_radius, np.zeros((0, 3)))) for f in hand.fingers
-    )
     cone = np.radians(40.0)
-    with_spheres = pad_bulges(replace(hand, fingers=spheres), cone)
+    with_spheres = pad_bulges(hand.with_balls(), cone)
     assert np.all(pad_bulges(hand, cone) < 1.3e-3)
     assert np.all(pad_bulges(hand, cone) < 0.65 * with_spheres)
 
@@ -129,3 +129,41 @@ def test_all_forms_of_a_ball_agree_with_pinocchio_and_with_differences(name):
             for c, d in enumerate(step * np.eye(nq)):
                 more, less = (hand.at(q + s * d).ball_centres([i], n[i][None]) for s in (1, -1))
                 np.testing.assert_allclose(moves[:, c], (more - less)[0] / (2 * step), atol=1e-5)
+
+
+def test_balls_take_a_domes_place_where_they_must():
+    """On an arm's hand, too; and MuJoCo, whose skins are balls, asks for them."""
+    hand = load_hand("psyonic_right")
+    balls = hand.with_balls()
+    assert not hand.has_balls
+    assert balls.has_balls
+    assert balls.with_balls() is balls
+    for a, b in zip(hand.fingers, balls.fingers, strict=True):
+        np.testing.assert_array_equal(a.pad_centre, b.dome.centre)
+        assert a.pad_radius == b.dome.radius
+    q = hand.middle
+    np.testing.assert_allclose(hand.at(q).pad_centres, balls.at(q).pad_centres, atol=1e-15)
+    models = pytest.importorskip("sim_sensor.physics.mujoco_models")
+    with pytest.raises(ValueError, match="psyonic_right has domed pads"):
+        models.build_models(hand, None)
+
+
+def test_what_is_kept_of_a_hand_goes_by_its_domes():
+    hand = load_hand("dex3_right")
+    assert hand_fingerprint(hand) != hand_fingerprint(hand.with_balls())
+    middle = hand.finger("middle")
+    flat = replace(middle, dome=replace(middle.dome, axes=0.5 * middle.dome.axes))
+    changed = replace(hand, fingers=(*hand.fingers[:2], flat))
+    assert hand_fingerprint(hand) != hand_fingerprint(changed)
+    spheres = link_spheres(changed)
+    index, other = (np.sort(spheres.radii[spheres.finger_indices == i]) for i in (1, 2))
+    assert len(index) != len(other) or not np.allclose(index, other)
+
+
+def test_a_dome_cannot_be_changed():
+    for array in (DOME.centre, DOME.axes, DOME.spread, DOME.points):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0.0
+    mine = np.zeros(3)
+    Dome(mine, 0.01, np.zeros((0, 3)))
+    mine[0] = 1.0  # is mine still

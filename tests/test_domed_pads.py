@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -15,11 +16,12 @@ import pytest
 from scipy.optimize import brentq
 
 from estimator.axis import Axis
+from estimator.contact import Miss
 from estimator.profile import barrel, cylinder
 from estimator.surface import SurfaceOfRevolution
 from estimator.vectors import Array
 from hand_models import Hand, load_hand
-from hand_models.dome import Dome
+from hand_models.dome import LEAST_AXIS, Dome
 from hand_models.geometry import points_moved_by
 from planner.hand_tools import hand_tools
 from planner.motions.motion import Approach, approach_by_base
@@ -31,23 +33,10 @@ from sim_sensor.noise import simulated_sensor
 from sim_sensor.routes import DomeRoute, first_touch, nearest_centre
 from sim_sensor.world import World
 
-mujoco = pytest.importorskip("mujoco", minversion="3.9")
-
 RADIUS, HEIGHT = 0.035, 0.18
 UPRIGHT = Axis(np.zeros(3), np.array([0.0, 0.0, 1.0]))
 CAN = SurfaceOfRevolution(UPRIGHT, cylinder(RADIUS, HEIGHT))
 HANDS = ("psyonic_right", "dex3_right")
-
-
-def with_spheres(hand: Hand) -> Hand:
-    """The hand with the spheres that stand for its pads from afar."""
-    nothing = np.zeros((0, 3))
-    return replace(
-        hand,
-        fingers=tuple(
-            replace(f, dome=Dome(f.pad_centre, f.pad_radius, nothing)) for f in hand.fingers
-        ),
-    )
 
 
 def touches(hand: Hand, count: int) -> list[Reach]:
@@ -79,12 +68,14 @@ def touches(hand: Hand, count: int) -> list[Reach]:
 class Judge:
     """MuJoCo's cylinder and the hull of a fingertip's whole mesh."""
 
-    model: mujoco.MjModel
-    data: mujoco.MjData
+    model: Any
+    data: Any
     finger: str
 
     def distance(self, hand: Hand, q: np.ndarray, X_WB: pin.SE3) -> tuple[float, np.ndarray]:
         """Between both, negative where they overlap, and the place on the can."""
+        import mujoco
+
         X = X_WB * hand.at(q).data.oMi[tip_joint(hand, self.finger)]
         self.data.mocap_pos[0] = X.translation
         mujoco.mju_mat2Quat(self.data.mocap_quat[0], np.ascontiguousarray(X.rotation).ravel())
@@ -100,6 +91,7 @@ def tip_joint(hand: Hand, finger: str) -> int:
 
 
 def judge_of(hand: Hand, finger: str) -> Judge:
+    mujoco = pytest.importorskip("mujoco", minversion="3.9")
     spec = mujoco.MjSpec()
     spec.worldbody.add_geom(
         name="can", type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[RADIUS, HEIGHT / 2, 0.0]
@@ -138,7 +130,7 @@ def test_the_mesh_touches_when_and_where_the_dome_does(name):
     assert np.abs(early).max() < 8e-4
     assert np.sqrt(np.mean(early**2)) < 3e-4
     assert np.median(beside) < 2e-3  # facets of the mesh are as long
-    as_spheres = _misses(with_spheres(hand))
+    as_spheres = _misses(hand.with_balls())
     assert np.sqrt(np.mean(early**2)) < 0.5 * np.sqrt(np.mean(as_spheres[0] ** 2))
     assert np.median(beside) < 0.7 * np.median(as_spheres[1])
 
@@ -172,7 +164,27 @@ def test_our_own_world_feels_what_the_dome_touches(name):
         X_WT = hand.at(reach.q, pin.SE3(first.rotation, there)).transform_tip_to_world(finger)
         gaps = [elsewhere.signed_distance(np.asarray(X_WT.act(x))) for x in finger.dome.points]
         assert 0.0 <= min(gaps) < 2e-4  # 1500 points of it: the nearest one nearly touches
-        assert elsewhere.signed_distance(record.tip) == pytest.approx(finger.dome.radius, abs=1e-8)
+        assert elsewhere.signed_distance(record.tip) == pytest.approx(finger.dome.ball, abs=1e-8)
+
+
+def test_a_dome_that_starts_in_the_object_or_passes_it_is_told():
+    hand = load_hand("psyonic_right")
+    (reach,) = touches(hand, 1)
+    approach = approach_by_base(hand, reach)
+    inside = _world(CAN, hand)
+    last = len(approach.path) - 3
+    inside.touch(replace(approach, path=approach.path[last:], bases=approach.bases[last:],
+                         tip_centres=approach.tip_centres[last:]))  # fmt: skip
+    record = inside.records[0]
+    assert record.stop == 0.0
+    assert record.overlap > 0.01
+    np.testing.assert_allclose(record.truth.p, reach.points[0], atol=1e-3)
+    beyond = SurfaceOfRevolution(Axis(np.array([1.0, 0.0, 0.0]), UPRIGHT.direction), CAN.profile)
+    aside = _world(beyond, hand)
+    missed = aside.touch(approach)
+    assert isinstance(missed, Miss)
+    assert missed.radius == hand.finger(approach.finger).dome.ball
+    assert aside.signed_distance(missed.tip) > missed.radius
 
 
 def test_a_dome_stops_where_its_nearest_ball_does():
@@ -181,14 +193,14 @@ def test_a_dome_stops_where_its_nearest_ball_does():
     world, tilt = _world(CAN, None), 0.5
     R = np.array([[1, 0, 0], [0, np.cos(tilt), -np.sin(tilt)], [0, np.sin(tilt), np.cos(tilt)]])
     x = nearest_centre(dome, pin.SE3(R, np.array([0.08, 0.0, 0.01])), world._distance)
-    np.testing.assert_allclose(x, [0.08 - 1e-3, 0.0, 0.01], atol=1e-6)  # the least axis
+    np.testing.assert_allclose(x, [0.08 - LEAST_AXIS, 0.0, 0.01], atol=1e-6)  # the least axis
     shifted = pin.SE3(R, np.array([0.08, 0.05, 0.01]))  # beyond its end
     end = nearest_centre(dome, shifted, world._distance)
     local = R.T @ (end - shifted.translation)
     assert local[2] == pytest.approx(0.03, abs=1e-3)
     ends = tuple(pin.SE3(R, p) for p in (np.array([0.1, 0.0, 0.0]), np.zeros(3)))
     stop = first_touch(DomeRoute(dome, ends), world._distance)
-    assert stop == pytest.approx((0.1 - RADIUS - 0.007) / 0.1, abs=1e-6)
+    assert stop == pytest.approx((0.1 - RADIUS - 0.006) / 0.1, abs=1e-6)
 
 
 def _world(surface: SurfaceOfRevolution, hand: Hand | None) -> World:

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from touched_scene import Scene
 
-from estimator.belief import Belief, update
+from estimator.belief import Belief, update, wall_readings
 from estimator.surface import SurfaceOfRevolution
 from planner.off_the_wall import (
     FEATURE_LENGTH,
     FEATURE_SD,
     ODDEST,
     TOLD,
+    _errors,
     features,
     off_the_wall,
 )
@@ -34,7 +35,7 @@ def test_nothing_is_doubted_where_it_was_touched_and_all_of_it_far_away():
     sd = FEATURE_SD * belief.band.mean.mean()
     Z, length = np.sort(heights(belief)), FEATURE_LENGTH * np.ptp(belief.band.z)
     there = features(belief, Z)
-    assert np.all(np.diag(there) < 1.01 * TOLD[0] ** 2)
+    assert np.all(np.diag(there) < (2.0 * TOLD[0]) ** 2)
     gap = np.argmax(np.diff(Z))
     between = features(belief, np.array([0.5 * (Z[gap] + Z[gap + 1])]))
     assert 0.7 * sd**2 < between[0, 0] <= sd**2  # some two lengths from either
@@ -62,12 +63,34 @@ def test_walls_drawn_at_random_are_as_far_off_as_it_says():
         return -scale * (w[:, None] * np.sin(w[:, None] * at[:, None] + phase[:, None])).sum(axis=2)
 
     told = np.hstack([wall(Z), slope(Z)])
-    told += rng.normal(size=told.shape) * np.repeat(TOLD, len(Z))
+    told += rng.normal(size=told.shape) * _errors(belief, wall_readings(belief))
     guess, *_ = np.linalg.lstsq(told, wall(z), rcond=None)
     left = wall(z) - told @ guess
     found = left.T @ left / count
     allowed = 4.0 * sd**2 * np.sqrt(2.0 / count)
     np.testing.assert_allclose(features(belief, z), found, atol=allowed)
+
+
+def test_a_contact_on_an_end_tells_nothing_of_the_wall():
+    """Nor does one that is not sure where it was."""
+    scene = Scene(0)
+    contacts, axis = scene.touched()
+    surface = SurfaceOfRevolution(axis, scene.profile)
+    top = scene.profile.z_range[1]
+    u, across = axis.direction, surface.frame[0]
+    end = axis.point + top * u + 0.5 * scene.profile.derivatives(np.array(top))[0] * across
+    flat = replace(
+        contacts[0], position=end, normal=u, directions=surface.frame[:2], curvatures=np.zeros(2)
+    )
+    with_end = update(scene.belief, [*contacts, flat])
+    assert len(wall_readings(with_end).z) == 3
+    belief = update(scene.belief, contacts)
+    z = np.array([0.9 * top])
+    assert features(with_end, z)[0, 0] > 0.9 * features(belief, z)[0, 0]
+    vague = [replace(c, noise=replace(c.noise, position=2e-3)) for c in contacts]
+    Z = heights(belief)
+    doubtful = features(update(scene.belief, vague), Z)
+    assert np.all(np.diag(doubtful) > 4.0 * np.diag(features(belief, Z)))
 
 
 def test_one_odd_contact_is_no_motion_and_two_are():

@@ -1,8 +1,9 @@
 """Where fingertips really come to rest when a planned grasp closes on another object.
 
 A grasp is planned on the believed object; every finger closes along its planned normal. On an
-object a little other than believed the pad, a sphere, meets the wall elsewhere, earlier or later,
-under another normal, or not at all. The object is taken to stand still until all fingers touch.
+object a little other than believed the pad, a sphere or taken for the one that touches as it does
+where it is planned to, meets the wall elsewhere, earlier or later, under another normal, or not at
+all. The object is taken to stand still until all fingers touch.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """Where pads on straight approaches meet many objects, walls or rims, inside compiled loops.
 
-A pad is a ball. It touches where its centre comes onto the wall's offset surface, whose meridian is
+A pad is a ball, or taken for the one that stands for it from afar. It touches where its centre
+comes onto the wall's offset surface, whose meridian is
 
     R(h) = r + rho / w,   Z(h) = h - rho r' / w,   w = sqrt(1 + r'^2)
 

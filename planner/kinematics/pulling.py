@@ -32,12 +32,8 @@ def pull(
     nq, J = path.shape[1], len(chains.parents)
     R, p = np.zeros((J, 3, 3)), np.zeros((J, 3))
     moves, turns = np.zeros((3, nq)), np.zeros((3, nq))
-    turning, system, lower, error = (
-        np.zeros((3, 3)),
-        np.zeros((3, 3)),
-        np.zeros((3, 3)),
-        np.zeros(3),
-    )
+    turning, system, lower = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
+    error = np.zeros(3)
     for k in range(len(path)):
         if marching and k > 0:
             for c in range(nq):

@@ -48,15 +48,17 @@ def rest(
     """
     m, nq, J = fingers.shape[1], q.shape[1], len(chains.parents)
     joints_R, joints_p = np.zeros((J, 3, 3)), np.zeros((J, 3))
-    pads, jacobians = np.zeros((m, 4, 3)), np.zeros((m, 2, 3, nq))  # centre, normal, n, facing
+    pads, jacobians = np.zeros((m, 4, 3)), np.zeros((m, 2, 3, nq))  # centre, normal, n, about that
     rows, residual = np.zeros((ROWS * m, nq + 6)), np.zeros(ROWS * m)
     system, lower = np.zeros((ROWS * m, ROWS * m)), np.zeros((ROWS * m, ROWS * m))
     step = np.zeros(nq + 6)
-    looks = 1 if np.all(chains.dome_radii == 0.0) else 2  # a dome again along what it met
+    looks = 1 if np.all(chains.dome_spreads == 0.0) else 2  # a dome again along what it met
     for i in range(len(q)):
         place_joints(chains, q[i], joints_R, joints_p)
         _face(chains, fingers[i], R[i], joints_R, joints_p, pads)
         for turn in range(iterations + looks):
+            if turn > iterations:
+                _as_met(pads)
             place_joints(chains, q[i], joints_R, joints_p)
             _pads(chains, fingers[i], R[i], p[i], joints_R, joints_p, pads, jacobians)
             _residuals(
@@ -135,7 +137,7 @@ def _residuals(
         w = sqrt(1.0 + dr**2)
         n = pads[k, 2]
         n[0], n[1], n[2] = centre[0] / rho / w, centre[1] / rho / w, -dr / w
-        _go_along(n, pads[k, 3])
+        _halfway(n, pads[k, 3])
         gap = ((rho - r) - dr * (centre[2] - z)) / w - chains.pad_radii[fingers[k]]
         cosine = -(pad[0] * n[0] + pad[1] * n[1] + pad[2] * n[2])
         angle = acos(min(max(cosine, -1.0), 1.0))
@@ -152,11 +154,18 @@ def _residuals(
 
 
 @compiled_part
-def _go_along(n: Array, facing: Array) -> None:
-    """Turn a pad's direction half of the way to a normal."""
-    x, y, z = facing[0] + n[0], facing[1] + n[1], facing[2] + n[2]
+def _as_met(pads: Array) -> None:
+    for k in range(len(pads)):
+        for a in range(3):
+            pads[k, 3, a] = pads[k, 2, a]
+
+
+@compiled_part
+def _halfway(n: Array, about: Array) -> None:
+    """Turn a direction half of the way to a normal."""
+    x, y, z = about[0] + n[0], about[1] + n[1], about[2] + n[2]
     length = max(sqrt(x * x + y * y + z * z), 1e-9)
-    facing[0], facing[1], facing[2] = x / length, y / length, z / length
+    about[0], about[1], about[2] = x / length, y / length, z / length
 
 
 @compiled_part

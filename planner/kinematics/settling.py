@@ -52,7 +52,7 @@ def settle(
         for j in range(k):
             middle[i] += demands.points[j, i] / k
     _turn_back(demands, R)
-    share, last, domed = 1.0, np.inf, np.any(chains.dome_radii != 0.0)
+    share, last, domed = 1.0, np.inf, np.any(chains.dome_spreads != 0.0)
     for turn in range(iterations + 1):
         used, off = write_rows(chains, demands, q, R, p, middle, rows, residual)
         if off < CLOSE or turn == iterations:

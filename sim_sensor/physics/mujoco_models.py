@@ -70,11 +70,6 @@ def build_models(
         ValueError: An object that is to stand on its end, and leans; a hand whose pads are no
             balls, as the skins here are.
     """
-    if not hand.has_balls:
-        raise ValueError(
-            f"{hand.name} has domed pads, and skins in MuJoCo are balls of gel: let it wear those,"
-            " hand.with_balls(), and plan with it"
-        )
     return Models(moving_model(hand, surface, standing), feeling_model(hand, surface, standing))
 
 
@@ -84,6 +79,7 @@ def moving_model(
     """What moves and collides; arguments as of `build_models`."""
     if standing is not None and surface.axis.direction[2] < 1.0 - 1e-9:
         raise ValueError("standing: an object stands on a table with its axis along +z")
+    _require_balls(hand)
     spec = _spec()
     how = standing or Standing(_HELD_MASS)
     add_hand(spec, hand, links=True, object_mass=np.inf if standing is None else how.mass)
@@ -98,6 +94,7 @@ def feeling_model(
     hand: Hand, surface: SurfaceOfRevolution, standing: Standing | None = None
 ) -> mujoco.MjModel:
     """What is felt, some seconds for its octree; arguments as of `build_models`."""
+    _require_balls(hand)
     spec = _spec()
     add_hand(spec, hand, links=False)
     for finger in hand.fingers:
@@ -107,6 +104,14 @@ def feeling_model(
     model = spec.compile()
     settle_skins(model)
     return model
+
+
+def _require_balls(hand: Hand) -> None:
+    if not hand.has_balls:
+        raise ValueError(
+            f"{hand.name} has domed pads, and skins in MuJoCo are balls of gel: let it wear those,"
+            " hand.with_balls(), and plan with it"
+        )
 
 
 def _spec() -> mujoco.MjSpec:
