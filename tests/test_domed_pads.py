@@ -127,8 +127,8 @@ def test_the_mesh_touches_when_and_where_the_dome_does(name):
     """Within what the fit leaves over; as spheres they would be off by more than twice as much."""
     hand = load_hand(name)
     early, beside = _misses(hand)
-    assert np.abs(early).max() < 8e-4
-    assert np.sqrt(np.mean(early**2)) < 3e-4
+    assert np.abs(early).max() < 1.2e-3
+    assert np.sqrt(np.mean(early**2)) < 3.5e-4
     assert np.median(beside) < 2e-3  # facets of the mesh are as long
     as_spheres = _misses(hand.with_balls())
     assert np.sqrt(np.mean(early**2)) < 0.5 * np.sqrt(np.mean(as_spheres[0] ** 2))
