@@ -79,12 +79,15 @@ def _errors(before: Belief, told: ProfileReadings) -> Array:
 
 
 def _square(off: Array, covariance: Array) -> float:
-    """Mahalanobis' square, of which the contact that disagrees most adds `ODDEST` at most."""
+    """Mahalanobis' square, of which the contact that disagrees most adds `ODDEST` at most; one by
+    itself has nobody to be odder than."""
 
     def of(kept: Index) -> float:
         part = covariance[np.ix_(kept, kept)]
         return float(off[kept] @ np.linalg.solve(part, off[kept]))
 
     every = np.arange(len(off), dtype=np.intp)
+    if len(off) == 1:
+        return of(every)
     others = min(of(np.delete(every, k)) for k in every)
     return min(of(every), others + ODDEST)

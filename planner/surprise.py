@@ -31,7 +31,7 @@ from planner.off_the_wall import off_the_wall
 
 FEIGNED = 10.0  # real readings fit a little worse than their model: their p-value counts so often
 ALARM = 0.03  # probability of a false alarm at a placement, were all models exact
-AGREES = 0.1  # from where later touches confirm earlier ones; below, they only count
+AGREES = 0.1  # from where later touches confirm earlier ones; below, nothing is confirmed any more
 MENTIONED = 0.01  # hypotheses that may be the right one
 RESTLESS = 3  # surprises from which the object counts as moving all the time
 LEAST_MOTION = (3e-3, float(np.deg2rad(3.0)))  # rms by which a belief is widened [m], [rad]
@@ -92,8 +92,10 @@ def learn(known: Learnt, outcomes: Sequence[Contact | Miss]) -> Learnt:
     belief = update(known.belief, felt)
     motion = motion_between(known.belief, belief, felt)
     if motion is None or motion.p_value > ALARM:
+        more = sum(isinstance(touch, Contact) for touch in felt)
         agree = motion is not None and motion.p_value > AGREES
-        agreeing = known.agreeing + agree * sum(isinstance(touch, Contact) for touch in felt)
+        doubtful = motion is not None and not agree
+        agreeing = 0 if doubtful else known.agreeing + agree * more
         return replace(known, belief=belief, agreeing=agreeing, surprise=None)
     surprises, restless = known.surprises + 1, known.restless
     words = f"{motion.words}. Earlier contacts now count only as a wider prior"

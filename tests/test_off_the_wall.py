@@ -111,3 +111,5 @@ def test_one_odd_contact_is_no_motion_and_two_are():
     assert one <= calm + ODDEST + 1e-9
     two = off_the_wall(belief, [pushed(c, 0.02) for c in later[:2]] + later[2:])[0]
     assert two > one + ODDEST
+    alone = off_the_wall(belief, [pushed(later[0], 0.02)])[0]
+    assert alone > 3.0 * ODDEST  # nobody says that it is the odd one
