@@ -95,7 +95,7 @@ def update(belief: Belief, touches: Iterable[Contact | Miss]) -> Belief:
     beside = tuple(miss for miss in misses if _beside_wall(miss, belief))
     estimate = estimate_axis(contacts, prior=belief.prior, misses=beside)
     hypotheses = tuple(_with_sense(h, belief.prior.axis) for h in estimate.hypotheses)
-    band = _touched_band(belief.prior_band, estimate, hypotheses[0], contacts)
+    band = belief.prior_band.conditioned(_readings(estimate, hypotheses[0], contacts))
     return replace(
         belief,
         hypotheses=hypotheses,
@@ -140,13 +140,6 @@ def _with_sense(hypothesis: Hypothesis, reference: Axis) -> Hypothesis:
     axis = Axis(hypothesis.axis.point, -hypothesis.axis.direction)
     covariance = frozen(flip @ hypothesis.covariance @ flip.T)
     return replace(hypothesis, axis=axis, covariance=covariance)
-
-
-def _touched_band(
-    band: ProfileBand, estimate: AxisEstimate, hypothesis: Hypothesis, contacts: tuple[Contact, ...]
-) -> ProfileBand:
-    """The band about the likeliest axis."""
-    return band.conditioned(_readings(estimate, hypothesis, contacts))
 
 
 def wall_readings(belief: Belief) -> ProfileReadings:

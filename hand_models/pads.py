@@ -32,6 +32,7 @@ Array = NDArray[np.float64]
 TILTS = tuple(np.radians([30.0, 45.0, 60.0, 90.0]))  # from the palm side towards the finger's end
 GOOD = 1.2e-3  # misfit of a sphere: a patch of the tip that can be a pad [m]
 EXACT = 1.5e-4  # ... beyond which the pad is no sphere [m]
+DOUBTFUL = 5e-4  # misfit of a pad, sphere or dome, that its user should look at [m]
 _DIRECTIONS = 400
 _LOPSIDED = 0.1  # share of its range by which a joint must bend farther one way
 

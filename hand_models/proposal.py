@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from hand_models.assembly import read_part
 from hand_models.fields import HandError
-from hand_models.pads import GOOD, PadFit, measure_pad
+from hand_models.pads import DOUBTFUL, PadFit, measure_pad
 from hand_models.part import empty_part, grafted
 from hand_models.sources import SourceDescription
 
@@ -73,7 +73,7 @@ def propose_description(file: Path, *, base: str | None = None) -> Proposal:
     towards = _others(part.model, tips)
     for name, tip, other in zip(names, tips, towards, strict=True):
         fit = measure_pad(part, tip, towards=other)
-        if fit.misfit > GOOD:
+        if fit.misfit > DOUBTFUL:
             doubts.append(f"{name}: no pad fits the tip better than {1e3 * fit.misfit:.1f} mm")
         tables.append(_table(name, part.model.frames[tip].name, fit))
     head = _head(file, folders[0], base)

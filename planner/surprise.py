@@ -92,10 +92,7 @@ def learn(known: Learnt, outcomes: Sequence[Contact | Miss]) -> Learnt:
     belief = update(known.belief, felt)
     motion = motion_between(known.belief, belief, felt)
     if motion is None or motion.p_value > ALARM:
-        more = sum(isinstance(touch, Contact) for touch in felt)
-        agree = motion is not None and motion.p_value > AGREES
-        doubtful = motion is not None and not agree
-        agreeing = 0 if doubtful else known.agreeing + agree * more
+        agreeing = _agreeing(known, motion, felt)
         return replace(known, belief=belief, agreeing=agreeing, surprise=None)
     surprises, restless = known.surprises + 1, known.restless
     words = f"{motion.words}. Earlier contacts now count only as a wider prior"
@@ -105,6 +102,15 @@ def learn(known: Learnt, outcomes: Sequence[Contact | Miss]) -> Learnt:
         words = f"{words}; it keeps happening, so contacts count as {1e3 * restless:.0f} mm worse"
     belief = after_motion(known.belief, felt, motion)
     return Learnt(belief, 0, words, surprises, restless)
+
+
+def _agreeing(known: Learnt, motion: Motion | None, felt: Sequence[Contact | Miss]) -> int:
+    """Touches that agree by now; a doubtful one takes them back, one that says nothing does not."""
+    if motion is None:
+        return known.agreeing
+    if motion.p_value <= AGREES:
+        return 0
+    return known.agreeing + sum(isinstance(touch, Contact) for touch in felt)
 
 
 def motion_between(before: Belief, after: Belief, later: Sequence[Contact | Miss]) -> Motion | None:

@@ -72,7 +72,8 @@ def test_jaws_of_a_gripper_look_at_each_other(tmp_path):
     urdf = ROBOTS / "panda_description" / "urdf" / "panda.urdf"
     proposal = propose_description(urdf)
     assert proposal.base == "panda_hand"
-    assert all("no sphere fits" in doubt for doubt in proposal.doubts)  # they are flat
+    assert len(proposal.doubts) == 2  # they are flat
+    assert all("no pad fits the tip better than 0.6 mm" in doubt for doubt in proposal.doubts)
     (tmp_path / "jaws.toml").write_text(proposal.text)
     hand = load_hand(tmp_path / "jaws.toml")
     pose = hand.at(hand.upper)

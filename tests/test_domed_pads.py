@@ -29,8 +29,9 @@ from planner.reaching.reach import Reach, ReachSolver
 from planner.reaching.reach_task import ReachOptions
 from planner.reaching.solid import RevolvedSolid
 from planner.reaching.starts import Start
+from sim_sensor.dome_distance import nearest_centre
 from sim_sensor.noise import simulated_sensor
-from sim_sensor.routes import DomeRoute, first_touch, nearest_centre
+from sim_sensor.routes import DomeRoute, first_touch
 from sim_sensor.world import World
 
 RADIUS, HEIGHT = 0.035, 0.18

@@ -4,7 +4,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from grasp_moves import from_home
-from motion_study import beyond, draw_scene, refusals, study
+from motion_scenes import draw_scene
+from motion_study import beyond, refusals, study
 from raw_meshes import RawMeshes
 
 from estimator.axis import Axis

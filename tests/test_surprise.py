@@ -27,15 +27,15 @@ def test_an_object_at_rest_seldom_seems_to_move():
 
 
 def test_necks_and_rims_seldom_seem_a_motion():
-    """60 sessions on objects whose walls are not as smooth as their bands: measured, 5 alarms."""
+    """60 sessions on objects whose walls are not as smooth as their bands: measured, no alarm."""
     names = ("bottle", "spindle", "vase", "cup", "knob", "jar-lid")
     alarms = [p_value(seed, 0.0, name) < ALARM for name in names for seed in range(10)]
-    assert sum(alarms) <= 9
+    assert sum(alarms) <= 3
 
 
 def test_a_shift_of_3_mm_seldom_goes_unseen():
     """30 sessions; five in six are seen."""
-    assert sum(p_value(seed, 3e-3) < ALARM for seed in range(RUNS)) >= 22
+    assert sum(p_value(seed, 3e-3) < ALARM for seed in range(RUNS)) >= 23
 
 
 def test_what_was_learnt_of_an_object_that_moved_holds_where_it_is_now():

@@ -14,30 +14,15 @@ from estimator.vectors import Array, frozen, unit
 from hand_models.hand import Hand
 from sim_sensor.physics.mujoco_contact import NOTHING, Felt, on_board, touching_object
 from sim_sensor.physics.mujoco_hand import joint_targets, link_name, pad_name, place_base
+from sim_sensor.routes import HandPath
 
 SPEED, BACK = 0.03, 0.15  # of the pad on its way and back [m/s]
 SETTLE = 0.2  # of the force, before it feels [s]
 _BACK_OFF, _FARTHEST = 2e-3, 0.3  # steps and most of a start that already presses [m]
 
 
-class Touching(Protocol):
+class Touching(HandPath, Protocol):
     """What this world needs of an approach."""
-
-    @property
-    def finger(self) -> str:
-        """Whose pad touches."""
-
-    @property
-    def path(self) -> Array:
-        """Configurations of the hand, (K, nq)."""
-
-    @property
-    def bases(self) -> tuple[pin.SE3, ...]:
-        """Pose of the hand base for each, or one for all."""
-
-    @property
-    def tip_centres(self) -> Array:
-        """Centres of the pad's sphere, world, (K, 3) [m]."""
 
     @property
     def force_goal(self) -> float:
