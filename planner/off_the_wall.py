@@ -3,9 +3,9 @@
 The band of a profile is smooth over a third of the object's height; real walls have necks, rims and
 threads that it does not expect. So between the heights that were touched, a wall may have features
 of its own: a Gaussian process of short range, conditioned on radius and slope where contacts told
-of them (Rasmussen & Williams 2006, sections 2.2 and 9.4). And as one of several
-contacts may have met a feature that is odder than that, the farthest of them adds so much at most
-to what the others say.
+of them (Rasmussen & Williams 2006, sections 2.2 and 9.4). And as one of several contacts may have
+met a feature that is odder than that, the farthest of them adds so much at most to what the others
+say.
 """
 
 from __future__ import annotations
