@@ -53,7 +53,7 @@ def _location_cost(problem: Problem, x: Array, derivatives: bool, work: Work) ->
 @compiled_part
 def _prior_cost(problem: Problem, x: Array, derivatives: bool, work: Work) -> float:
     """Gaussian in the prior's chart; the Jacobian between charts by central differences."""
-    row = problem.line
+    row, chart = problem.line, work.local[0].chart
     point = vector(row, ORIGIN)
     frame = (vector(row, BASIS), vector(row, BASIS + 3), vector(row, BASIS + 6))
     a, u = line_of(x)
@@ -70,14 +70,14 @@ def _prior_cost(problem: Problem, x: Array, derivatives: bool, work: Work) -> fl
             a2, u2 = nudged(a, u, basis, j, -h)
             ahead, behind = chart_at(point, frame, a1, u1), chart_at(point, frame, a2, u2)
             for k in range(4):
-                work.chart[k, j] = (ahead[k] - behind[k]) / (2.0 * h)
+                chart[k, j] = (ahead[k] - behind[k]) / (2.0 * h)
         for j in range(4):
             for k in range(4):
-                work.gradient[j] += work.chart[k, j] * y[k]
+                work.gradient[j] += chart[k, j] * y[k]
                 for m in range(4):
                     for i in range(j + 1):
                         P_km = row[PRECISION + 4 * k + m]
-                        work.fisher[j, i] += work.chart[k, j] * P_km * work.chart[m, i]
+                        work.fisher[j, i] += chart[k, j] * P_km * chart[m, i]
     cost = 0.0
     for j in range(4):
         cost += 0.5 * here[j] * y[j]

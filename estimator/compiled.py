@@ -59,6 +59,15 @@ def compiled_part(function: F) -> F:
     return cast(F, found)
 
 
+def compiled_in_place(function: F) -> F:
+    """The same, its code written in place of the call: for thin layers over much code.
+
+    A compiled function holds all that it calls, and all of that goes through the compiler again
+    with every layer above it.
+    """
+    return _compiled(function, from_python=False, inline="always")
+
+
 def has_code(function: Callable[..., Any]) -> bool:
     """Whether the cache holds machine code of a compiled function, for whatever arguments."""
     found: Any = function
@@ -71,14 +80,14 @@ def _refuse(function: Callable[..., Any], *_: Any, **__: Any) -> None:
     raise TypeError(f"{name} is a part of compiled functions; Python may call what is @compiled")
 
 
-def _compiled(function: F, *, from_python: bool) -> F:
+def _compiled(function: F, *, from_python: bool, inline: str = "never") -> F:
     package = sys.modules[function.__module__.partition(".")[0]]
     other = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(_folder(Path(str(package.__file__)).parent))  # read by the next
     try:
         found = numba.njit(
             cache=True, error_model="numpy", fastmath=FAST, nogil=True,
-            no_cfunc_wrapper=True, no_cpython_wrapper=not from_python,
+            no_cfunc_wrapper=True, no_cpython_wrapper=not from_python, inline=inline,
         )(function)  # fmt: skip
     finally:
         numba.config.CACHE_DIR = other

@@ -16,13 +16,13 @@ from estimator.nuisances import Owner
 from estimator.posterior import cost_at
 from estimator.prior import AxisPrior
 from estimator.problem import Problems, pose_problems, problem_at
-from estimator.readings import ERRORS, Readings, exact_readings
+from estimator.readings import Readings, exact_readings
 from estimator.search import DRAMATICALLY_WORSE
 from estimator.side_by_side import in_shares
-from estimator.sight import LOCAL, fill_motions, seen_from
+from estimator.sight import fill_motions, seen_from
 from estimator.surface import Geometry
 from estimator.vectors import Array
-from estimator.work import work_space
+from estimator.work import LOCAL_WORK, work_space
 
 WITH_ROTATION = 5  # parameters: the line's four and the common rotation
 
@@ -54,21 +54,23 @@ def contact_information(
 
 @compiled
 def _fill_information(readings: Readings, lines: Array, out: Array) -> None:
-    gradient, fisher = np.zeros(LOCAL), np.zeros((LOCAL, LOCAL))
-    rows, lean = np.zeros((8, LOCAL)), np.zeros((3, ERRORS))
+    one = np.zeros(1, dtype=LOCAL_WORK)[0]
     for s in range(readings.shape[0]):
         a, u = vector(lines[s], 0), vector(lines[s], 3)
         E1, E2 = across(u)
         for i in range(readings.shape[1]):
             row = readings[s, i]
             seen = seen_from(row, a, u, (0.0, 0.0, 0.0), 0.0)
-            fill_motions(seen, E1, E2, rows, WITH_ROTATION)
-            fit = fit_of(row, seen, 0.0, lean)
-            fill_derivatives(row, seen, fit, 1.0, 0.0, lean, gradient, fisher, rows, WITH_ROTATION)
+            fill_motions(seen, E1, E2, one.rows, WITH_ROTATION)
+            fit = fit_of(row, seen, 0.0, one.lean)
+            fill_derivatives(
+                row, seen, fit, 1.0, 0.0, one.lean,
+                one.gradient, one.fisher, one.rows, WITH_ROTATION,
+            )  # fmt: skip
             for j in range(WITH_ROTATION):
                 for k in range(j + 1):
-                    out[s, i, j, k] = fisher[j, k]
-                    out[s, i, k, j] = fisher[j, k]
+                    out[s, i, j, k] = one.fisher[j, k]
+                    out[s, i, k, j] = one.fisher[j, k]
 
 
 def known_before(prior: Array, direction_offset: float) -> Array:

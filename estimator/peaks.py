@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from estimator.chart import line_of, separation
-from estimator.compiled import across, compiled_part
+from estimator.compiled import across, compiled_in_place, compiled_part
 from estimator.linear import factor, inverse, marginal
 from estimator.posterior import contacts_cost, cost_at
 from estimator.problem import Problem, place, spread_of, states_of
@@ -37,7 +37,7 @@ class Peaks(NamedTuple):
     tally: Array
 
 
-@compiled_part
+@compiled_in_place
 def evidence_of(problem: Problem, x: Array, work: Work) -> float:
     """Negative log of Laplace's evidence, up to what all peaks share."""
     cost = cost_at(problem, x, True, work)
@@ -51,7 +51,7 @@ def _add_finite_volume(problem: Problem, fisher: Array, shift: float, turn: floa
         fisher[j, j] += (shift * spread_of(problem)) ** -2 if j < 2 else turn**-2
 
 
-@compiled_part
+@compiled_in_place
 def describe(problem: Problem, peaks: Peaks, k: int, work: Work) -> None:
     """Fill what is said of peak k, whose state is known."""
     x = peaks.x[k]
@@ -63,7 +63,7 @@ def describe(problem: Problem, peaks: Peaks, k: int, work: Work) -> None:
     _contacts_alone(problem, peaks, k, work)
 
 
-@compiled_part
+@compiled_in_place
 def _contacts_alone(problem: Problem, peaks: Peaks, k: int, work: Work) -> None:
     """What the contacts and the nuisance states' priors say of the line, without its own prior."""
     x, P = peaks.x[k], len(work.gradient)
@@ -75,7 +75,7 @@ def _contacts_alone(problem: Problem, peaks: Peaks, k: int, work: Work) -> None:
         prior += problem.precision[j] * x[6 + j] ** 2
     contacts_cost(problem, x, True, work)
     for j in range(4):
-        peaks.tally[k, j] = work.tally[j] + (prior if j % 2 == 0 else -4.0)
+        peaks.tally[k, j] = work.local[0].tally[j] + (prior if j % 2 == 0 else -4.0)
     for i in range(len(problem.contacts)):
         peaks.right[k, i] = work.right[i]
     information = marginal(work.fisher)
@@ -94,14 +94,15 @@ def _parallel_row(problem: Problem, i: int, x: Array, covariance: Array, work: W
     delta, _, bias = states_of(problem, i, x)
     seen = seen_from(contact, a, u, bias, delta)
     E1, E2 = across(u)
-    fill_motions(seen, E1, E2, work.rows, LOCAL)
+    rows = work.local[0].rows
+    fill_motions(seen, E1, E2, rows, LOCAL)
     total = 0.0
     for j in range(LOCAL):
         J = place(problem, i, j)
         for k in range(LOCAL):
             K = place(problem, i, k)
             if J >= 0 and K >= 0:
-                total += work.rows[THETA, j] * work.rows[THETA, k] * covariance[J, K]
+                total += rows[THETA, j] * rows[THETA, k] * covariance[J, K]
     folded = 0.5 * abs(atan2(seen.s2, seen.c2))
     return 0.5 * (1.0 + erf((0.25 * pi - folded) / sqrt(2.0 * max(total, 1e-18))))
 

@@ -23,31 +23,32 @@ from estimator.work import Work
 def contacts_cost(problem: Problem, x: Array, derivatives: bool, work: Work) -> float:
     """Cost of all contacts; derivatives are added to those in work, tallies renewed."""
     a, u = line_of(x)
+    one = work.local[0]
     basis = across(u)
     cost = 0.0
-    for k in range(len(work.tally)):
-        work.tally[k] = 0.0
+    for k in range(len(one.tally)):
+        one.tally[k] = 0.0
     locals_ = 4 if len(problem.precision) == 0 else LOCAL
     for i in range(len(problem.contacts)):
         delta, scale, bias = states_of(problem, i, x)
         row = problem.contacts[i]
         seen = seen_from(row, a, u, bias, delta)
-        fit = fit_of(row, seen, scale, work.lean)
+        fit = fit_of(row, seen, scale, one.lean)
         density, trust, normal_only = fit.log_density, 1.0, 0.0
         if problem.gross > 0.0:
             density, trust, normal_only = gross_errors(row, fit, problem.gross)
         cost -= density
         work.right[i] = trust
-        _add_to_tally(row, fit, trust, normal_only, work.tally)
+        _add_to_tally(row, fit, trust, normal_only, one.tally)
         if derivatives:
-            fill_motions(seen, basis[0], basis[1], work.rows, locals_)
+            fill_motions(seen, basis[0], basis[1], one.rows, locals_)
             fill_derivatives(
-                row, seen, fit, trust, normal_only, work.lean,
-                work.local_gradient, work.local_fisher, work.rows, locals_,
+                row, seen, fit, trust, normal_only, one.lean,
+                one.gradient, one.fisher, one.rows, locals_,
             )  # fmt: skip
         cost += add_constraints(
             row, seen, problem.slope, derivatives,
-            work.local_gradient, work.local_fisher, work.rows, locals_,
+            one.gradient, one.fisher, one.rows, locals_,
         )  # fmt: skip
         if derivatives:
             _scatter(problem, i, work, locals_)
@@ -67,15 +68,16 @@ def _add_to_tally(row: Array, fit: Fit, trust: float, normal_only: float, tally:
 
 @compiled_part
 def _scatter(problem: Problem, i: int, work: Work, locals_: int) -> None:
+    one = work.local[0]
     for j in range(locals_):
         J = place(problem, i, j)
         if J < 0:
             continue
-        work.gradient[J] += work.local_gradient[j]
+        work.gradient[J] += one.gradient[j]
         for k in range(j + 1):
             K = place(problem, i, k)
             if K >= 0:
-                work.fisher[max(J, K), min(J, K)] += work.local_fisher[j, k]
+                work.fisher[max(J, K), min(J, K)] += one.fisher[j, k]
 
 
 @compiled

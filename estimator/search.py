@@ -9,7 +9,7 @@ import numpy as np
 from estimator.background import ORIGIN
 from estimator.chart import separation, stepped
 from estimator.climb import climb
-from estimator.compiled import compiled_part, vector
+from estimator.compiled import compiled_in_place, compiled_part, vector
 from estimator.linear import marginal
 from estimator.posterior import cost_at
 from estimator.problem import Problem, trusting
@@ -52,7 +52,7 @@ def bench(most: int, D: int) -> Bench:
     )
 
 
-@compiled_part
+@compiled_in_place
 def find_peaks(
     problem: Problem, extra: Array, room: Bench, work: Work, peaks: Array, costs: Array
 ) -> int:
@@ -77,7 +77,7 @@ def find_peaks(
     return kept
 
 
-@compiled_part
+@compiled_in_place
 def _climb_all(problem: Problem, room: Bench, count: int, work: Work) -> int:
     """Rough climbs from every start that is not on its way to a known peak."""
     found, least = 0, room.costs[room.order[0]]
@@ -93,7 +93,7 @@ def _climb_all(problem: Problem, room: Bench, count: int, work: Work) -> int:
     return found
 
 
-@compiled_part
+@compiled_in_place
 def _start(problem: Problem, room: Bench, count: int, work: Work) -> None:
     """Seeds as states with every nuisance zero, and their costs."""
     origin = vector(problem.line, ORIGIN)
@@ -107,7 +107,7 @@ def _start(problem: Problem, room: Bench, count: int, work: Work) -> None:
         room.costs[k] = _finite(cost_at(problem, x, False, work))
 
 
-@compiled_part
+@compiled_in_place
 def _first_steps(problem: Problem, room: Bench, count: int, work: Work) -> int:
     """A few steps from the cheapest seeds; `order` then has those worth the whole climb first."""
     order, costs = room.order, room.costs
@@ -126,7 +126,7 @@ def _finite(cost: float) -> float:
     return cost if np.isfinite(cost) else _NEVER
 
 
-@compiled_part
+@compiled_in_place
 def _on_the_way(problem: Problem, x: Array, kept: Array, count: int, work: Work) -> bool:
     """Whether a start has come so near to a peak already found that it would end there too."""
     cost_at(problem, x, True, work)

@@ -10,7 +10,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from hand_models.geometry import dome_in_joint, pad_in_joint
 from hand_models.hand import Hand
@@ -20,75 +20,100 @@ Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 
+JOINT = np.dtype([
+    ("parent", np.int64), ("rotation", np.float64, (3, 3)), ("position", np.float64, 3),
+    ("angular", np.float64, 3), ("linear", np.float64, 3),
+    ("q_index", np.int64), ("multiplier", np.float64), ("offset", np.float64),
+], align=True)  # fmt: skip
+PAD = np.dtype([
+    ("joint", np.int64), ("centre", np.float64, 3), ("normal", np.float64, 3),
+    ("radius", np.float64), ("dome_centre", np.float64, 3), ("dome_spread", np.float64, (3, 3)),
+    ("dome_more", np.float64),
+], align=True)  # fmt: skip
+
+
 class Chains(NamedTuple):
     """J joints, the first of them the hand base; F pads.
 
+    Records, not an array for each number: every array that compiled functions hand to one another
+    costs a tenth of a second of compiling.
+
     Attributes:
-        parents: (J,) joint that carries each; its own for the base.
-        rotations, positions: (J, 3, 3), (J, 3) fixed pose of each joint in its parent [m].
-        angular, linear: (J, 3) velocity in the joint's own frame per unit of its position.
-        q_indices, multipliers, offsets: (J,) joint j stands at multiplier q[q_index] + offset.
-        lower, upper: (nq,) limits.
-        pad_joints, pad_centres, pad_normals, pad_radii: (F,), (F, 3), (F, 3), (F,) in the joints'
-            frames: spheres that stand for the pads [m].
-        dome_centres, dome_spreads, dome_radii: (F, 3), (F, 3, 3), (F,) c and A of the pads'
-            surfaces (`hand_models.dome`) in the joints' frames, and rho less `pad_radii` [m].
+        joints: (J,) records of `parent`, the joint that carries it, its own for the base;
+            `rotation`, `position` (3, 3), (3,) fixed pose in its parent [m]; `angular`, `linear`
+            (3,) velocity in its own frame per unit of its position; it stands at
+            `multiplier` q[`q_index`] + `offset`.
+        pads: (F,) records of `joint`, and in its frame `centre`, `normal` (3,), `radius` of the
+            sphere that stands for the pad [m]; `dome_centre`, `dome_spread` (3,), (3, 3) c and A of
+            the pad's surface (`hand_models.dome`) there, `dome_more` rho less `radius` [m].
         supports: (F, L) joints between base and pad, filled up with -1.
+        lower, upper: (nq,) limits.
+        domed: Whether some pad is no sphere.
     """
 
-    parents: IntArray
-    rotations: Array
-    positions: Array
-    angular: Array
-    linear: Array
-    q_indices: IntArray
-    multipliers: Array
-    offsets: Array
+    joints: NDArray[np.void]
+    pads: NDArray[np.void]
+    supports: IntArray
     lower: Array
     upper: Array
-    pad_joints: IntArray
-    pad_centres: Array
-    pad_normals: Array
-    pad_radii: Array
-    dome_centres: Array
-    dome_spreads: Array
-    dome_radii: Array
-    supports: IntArray
+    domed: bool
 
 
 @lru_cache(maxsize=8)
 def chains_of(hand: Hand) -> Chains:
     """The arrays of a hand; equal arguments give the same object, which is only to be read."""
-    model, motions = hand.model, joint_motions(hand.model)
-    placements = list(model.jointPlacements)
-    joints, centres, normals = zip(*(pad_in_joint(hand, f) for f in hand.fingers), strict=True)
-    domes, nothing = [dome_in_joint(hand, f) for f in hand.fingers], np.zeros(3)
+    pads = _pads(hand)
     return Chains(
-        parents=np.array([int(i) for i in model.parents]),
-        rotations=np.array([X.rotation for X in placements]),
-        positions=np.array([X.translation for X in placements]),
-        angular=np.array([nothing, *(motion.angular for motion in motions)]),
-        linear=np.array([nothing, *(motion.linear for motion in motions)]),
-        q_indices=np.array([0, *(motion.q_index for motion in motions)]),
-        multipliers=np.array([0.0, *(motion.multiplier for motion in motions)]),
-        offsets=np.array([0.0, *(motion.offset for motion in motions)]),
+        joints=_joints(hand),
+        pads=pads,
+        supports=_supports(hand, pads["joint"]),
         lower=np.array(hand.lower),
         upper=np.array(hand.upper),
-        pad_joints=np.array(joints),
-        pad_centres=np.array(centres),
-        pad_normals=np.array(normals),
-        pad_radii=np.array([f.pad_radius for f in hand.fingers]),
-        dome_centres=np.array([dome.centre for dome in domes]),
-        dome_spreads=np.array([dome.spread for dome in domes]),
-        dome_radii=np.array(
-            [dome.ball - f.pad_radius for dome, f in zip(domes, hand.fingers, strict=True)]
-        ),
-        supports=_supports(hand, joints),
+        domed=bool(np.any(pads["dome_spread"] != 0.0)),
     )
 
 
-def _supports(hand: Hand, joints: tuple[int, ...]) -> IntArray:
-    chains = [[int(j) for j in hand.model.supports[joint]][1:] for joint in joints]
+def records(kind: np.dtype[np.void], **columns: ArrayLike) -> NDArray[np.void]:
+    """N records, from a column for each of their fields, the first of them of N rows."""
+    out = np.zeros(len(np.asarray(next(iter(columns.values())))), dtype=kind)
+    for name in kind.fields or ():
+        out[name] = columns[name]
+    return out
+
+
+def _joints(hand: Hand) -> NDArray[np.void]:
+    model, nothing = hand.model, np.zeros(3)
+    motions, placements = joint_motions(model), list(model.jointPlacements)
+    return records(
+        JOINT,
+        parent=[int(i) for i in model.parents],
+        rotation=[X.rotation for X in placements],
+        position=[X.translation for X in placements],
+        angular=[nothing, *(motion.angular for motion in motions)],
+        linear=[nothing, *(motion.linear for motion in motions)],
+        q_index=[0, *(motion.q_index for motion in motions)],
+        multiplier=[0.0, *(motion.multiplier for motion in motions)],
+        offset=[0.0, *(motion.offset for motion in motions)],
+    )
+
+
+def _pads(hand: Hand) -> NDArray[np.void]:
+    joints, centres, normals = zip(*(pad_in_joint(hand, f) for f in hand.fingers), strict=True)
+    domes = [dome_in_joint(hand, f) for f in hand.fingers]
+    return records(
+        PAD,
+        joint=joints,
+        centre=centres,
+        normal=normals,
+        radius=[f.pad_radius for f in hand.fingers],
+        dome_centre=[dome.centre for dome in domes],
+        dome_spread=[dome.spread for dome in domes],
+        dome_more=[d.ball - f.pad_radius for d, f in zip(domes, hand.fingers, strict=True)],
+    )
+
+
+def _supports(hand: Hand, joints: IntArray) -> IntArray:
+    chains = [[int(j) for j in hand.model.supports[int(joint)]][1:] for joint in joints]
     out = np.full((len(chains), max(map(len, chains))), -1)
     for row, chain in zip(out, chains, strict=True):
         row[: len(chain)] = chain

@@ -26,6 +26,7 @@ from hand_models.hand import Hand
 Array = NDArray[np.float64]
 
 NEAR = (8e-3, 20e-3, 50e-3)  # pairs of links as near as this are sought first [m]
+NO_MISS = 1e-3  # margin with which the tree of boxes finds every pair that overlaps [m]
 
 
 @dataclass(frozen=True)
@@ -72,14 +73,12 @@ class HandCollision:
         start_afresh(self._shape_data)
         self._geometries = [shape.geometry for shape in self.shapes.model.geometryObjects]
         self._roots = _roots(hand, self.shapes.model)
-        self._trees: dict[int, ShapeTree] = {}
+        self._trees: dict[float, ShapeTree] = {}
         self._placed: tuple[Array, list[coal.Transform3s]] | None = None
 
     def is_self_free(self, q: ArrayLike) -> bool:
-        """Whether no two links overlap; stops at the first that do."""
-        return not pin.computeCollisions(
-            self.hand.model, self._data, self.shapes.model, self._shape_data, np.asarray(q), True
-        )
+        """Whether no two links overlap, by the distances of those that are near."""
+        return all(distance > 0.0 for distance in self._tree(NO_MISS).near(q).values())
 
     def among(self, bodies: Iterable[tuple[Body, float]]) -> Among:
         """The same together with bodies, each with how far to keep away from it [m]."""
@@ -107,9 +106,9 @@ class HandCollision:
 
     def _near_pairs(self, q: Array, most: float) -> dict[int, float]:
         """Pairs of links and their distances: all that are nearer than `most`, and others."""
-        for k, margin in enumerate(NEAR):
+        for margin in NEAR:
             if most <= margin or most == np.inf:
-                found = self._near(k).near(q)
+                found = self._tree(margin).near(q)
                 if found or most <= margin:
                     return found
         return dict(enumerate(self._self_distances(q).tolist()))
@@ -197,11 +196,11 @@ class HandCollision:
             self._placed = (q, [as_coal(X) for X in self._shape_data.oMg])
         return self._placed[1]
 
-    def _near(self, k: int) -> ShapeTree:
-        if k not in self._trees:
-            margins = [NEAR[k]] * len(self.shapes.model.collisionPairs)
-            self._trees[k] = ShapeTree(self.hand.model, self.shapes.model, margins)
-        return self._trees[k]
+    def _tree(self, margin: float) -> ShapeTree:
+        if margin not in self._trees:
+            margins = [margin] * len(self.shapes.model.collisionPairs)
+            self._trees[margin] = ShapeTree(self.hand.model, self.shapes.model, margins)
+        return self._trees[margin]
 
     def _self_distances(self, q: ArrayLike) -> Array:
         pin.computeDistances(

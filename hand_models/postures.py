@@ -15,7 +15,7 @@ from hand_models.hand import Hand, HandError
 
 Array = NDArray[np.float64]
 
-_VERSION = 4  # of the sampling and the rules of collision; part of the cache's key
+_VERSION = 5  # of the sampling and the rules of collision; part of the cache's key
 _FIELDS = ("q", "pad_centres", "pad_normals")
 _APART = 2e-3  # of links where a hand is to begin [m]
 _DRAWS_PER_POSTURE = 50  # a hand that is free of itself in fewer than 2 % of draws is misdescribed

@@ -1,6 +1,6 @@
 """The first plan on a machine: what it needs is compiled by two processes, in half the time of one.
 
-Half a minute on two cores; without this the first plan compiles by itself, in a minute and a half.
+Half a minute on two cores; without this the first plan compiles by itself, in a minute.
 """
 
 from __future__ import annotations

@@ -94,7 +94,6 @@ def main() -> int:
     if options.out is not None:
         try:
             text = json.dumps(_document(options, tables), indent=1, allow_nan=False)
-            options.out.parent.mkdir(parents=True, exist_ok=True)
             write_whole(options.out, (text + "\n").encode())
         except OSError as error:
             print(f"monte_carlo: --out {options.out}: cannot be written ({error})", file=sys.stderr)

@@ -35,7 +35,8 @@ def write_json(path: Path, record: dict[str, Any]) -> None:
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Under a temporary name beside it, then renamed."""
+    """Under a temporary name beside it, then renamed; its folder is made where there is none."""
+    path.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "wb") as file:

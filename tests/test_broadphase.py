@@ -73,6 +73,17 @@ def test_the_nearest_links_are_those_of_all_pairs(collision):
         assert len(bands) > 1
 
 
+def test_a_posture_is_free_whenever_it_is_asked(collision):
+    """coal's yes or no hangs on what was asked before; in every one of these distances decide."""
+    rng, free = np.random.default_rng(6), []
+    for _ in range(600):
+        q, _ = drawn(collision.hand, rng)
+        apart = all(distance > 0.0 for distance in collision._self_distances(q))
+        assert [collision.is_self_free(q) for _ in range(3)] == [apart] * 3
+        free.append(apart)
+    assert any(free)
+
+
 def test_the_nearest_links_of_a_way_are_the_least_of_its_postures(collision):
     rng = np.random.default_rng(5)
     way = [drawn(collision.hand, rng)[0] for _ in range(12)]

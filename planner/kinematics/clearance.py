@@ -27,7 +27,7 @@ def fill_clear(
         between: Heights out of which a sphere's centre does not count, (N, 2).
         out: (N,).
     """
-    J = len(chains.parents)
+    J = len(chains.joints)
     joints_R, joints_p, local = np.zeros((J, 3, 3)), np.zeros((J, 3)), np.zeros(3)
     for i in range(len(q)):
         place_joints(chains, q[i], joints_R, joints_p)

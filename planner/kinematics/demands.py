@@ -10,6 +10,7 @@ from math import acos, hypot, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimator.compiled import compiled_part
 from estimator.vectors import Array, Index
@@ -27,41 +28,43 @@ ARC = 0.05  # at which an angle counts as a violation [m]
 INSIDE = 0.97  # of the cone, where an angle beyond it goes
 
 
+CONTACT = np.dtype([
+    ("finger", np.int64), ("point", np.float64, 3), ("normal", np.float64, 3),
+], align=True)  # fmt: skip
+KNOT = np.dtype([("length", np.float64), ("cone", np.float64)], align=True)
+SPHERE = np.dtype([
+    ("joint", np.int64), ("centre", np.float64, 3), ("radius", np.float64),
+], align=True)  # fmt: skip
+SETTING = np.dtype([
+    ("R_WO", np.float64, (3, 3)), ("p_WO", np.float64, 3), ("table", np.float64, 4),
+    ("box", np.float64, (2, 3)), ("R_nominal", np.float64, (3, 3)), ("most_turn", np.float64),
+], align=True)  # fmt: skip
+
+
 class Demands(NamedTuple):
-    """What is asked of k fingers at K knots, in the world.
+    """What is asked of k fingers at K knots, in the world; in records, as `Chains`.
 
     Attributes:
-        fingers: (k,) pads.
-        points, normals: (k, 3) contacts.
-        lengths: (K,) of each knot along the normals [m].
-        cones: (K,) largest pad angle [rad].
-        R_WO, p_WO, meridian: The object.
-        table: (4,) n, h of the half-space n . p >= h.
-        joints, spheres: (M,) and (M, 4) link spheres: centre in the joint's frame and radius.
+        contacts: (k,) records of `finger`, the pad, and where it touches: `point`, `normal` (3,).
+        knots: (K,) records of `length` along the normals [m], `cone`, the largest pad angle [rad].
+        setting: (1,) record of the object's pose `R_WO`, `p_WO`; `table` (4,), n and h of the
+            half-space n . p >= h; `box` (2, 3), range of the base's position [m]; the base turns
+            from `R_nominal` by `most_turn` [rad] at most.
+        meridian: The object.
+        spheres: (M,) records of link spheres: `joint`, in its frame `centre` (3,), `radius` [m].
         asked: (K, M) least distance from object and table; -inf where none is asked [m].
         columns: (K, nq) unknown that moves each joint at each knot; joints, base, then the others'.
         willing: (unknowns,) how willingly each moves.
-        box: (2, 3) range of the base's position [m].
-        R_nominal, most_turn: The base turns from there by at most so much [rad].
     """
 
-    fingers: Index
-    points: Array
-    normals: Array
-    lengths: Array
-    cones: Array
-    R_WO: Array
-    p_WO: Array
+    contacts: NDArray[np.void]
+    knots: NDArray[np.void]
+    setting: NDArray[np.void]
     meridian: Meridian
-    table: Array
-    joints: Index
-    spheres: Array
+    spheres: NDArray[np.void]
     asked: Array
     columns: Index
     willing: Array
-    box: Array
-    R_nominal: Array
-    most_turn: float
 
 
 @compiled_part
@@ -70,18 +73,18 @@ def write_rows(
     rows: Array, residual: Array,
 ) -> tuple[int, float]:  # fmt: skip
     """Rows and residuals; how many, and the largest violation [m]."""
-    J, nq = len(chains.parents), q.shape[1]
+    J, nq = len(chains.joints), q.shape[1]
     joints_R, joints_p = np.zeros((J, 3, 3)), np.zeros((J, 3))
     used, off = 0, 0.0
     clear(rows)
     for knot in range(len(q)):
         place_joints(chains, q[knot], joints_R, joints_p)
-        for j in range(len(demands.fingers)):
+        for j in range(len(demands.contacts)):
             gap, angle = _pad_rows(
                 chains, demands, knot, j, joints_R, joints_p, R, p, middle, rows, residual, used, nq
             )
-            off = max(off, gap, ARC * (angle - demands.cones[knot]))
-            used += 3 if angle <= demands.cones[knot] else 4
+            off = max(off, gap, ARC * (angle - demands.knots[knot].cone))
+            used += 3 if angle <= demands.knots[knot].cone else 4
         near, depth = _sphere_rows(
             chains, demands, knot, joints_R, joints_p, R, p, middle, rows, residual, used, nq
         )
@@ -95,19 +98,20 @@ def _pad_rows(
     R: Array, p: Array, middle: Array, rows: Array, residual: Array, first: int, nq: int,
 ) -> tuple[float, float]:  # fmt: skip
     """Three rows of a pad's place, one of its angle if beyond the cone; gap and angle."""
-    finger, n = demands.fingers[j], demands.normals[j]
+    contact = demands.contacts[j]
+    finger, n = contact.finger, contact.normal
     centre, pad, arm, inward = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
     moves, turns, turning = np.zeros((3, nq)), np.zeros((3, nq)), np.zeros((3, 3))
     inward[0], inward[1], inward[2] = transposed_times(R, -n[0], -n[1], -n[2])
     place_pad(chains, finger, joints_R, joints_p, centre, pad)
     place_ball(chains, finger, joints_R, joints_p, inward, centre, turning)
     ball_jacobian(chains, finger, joints_R, joints_p, inward, centre, turning, moves, turns)
-    away, square, cosine = chains.pad_radii[finger] + demands.lengths[knot], 0.0, 0.0
+    away, square, cosine = chains.pads[finger].radius + demands.knots[knot].length, 0.0, 0.0
     there, facing = times(R, centre[0], centre[1], centre[2]), times(R, pad[0], pad[1], pad[2])
     for a in range(3):
         at = there[a] + p[a]
         arm[a] = at - middle[a]
-        gap = at - demands.points[j, a] - away * n[a]
+        gap = at - contact.point[a] - away * n[a]
         residual[first + a] = gap / PLACE_UNIT
         square += gap * gap
         cosine -= facing[a] * n[a]
@@ -119,14 +123,14 @@ def _pad_rows(
         for a in range(3):
             along = R[a, 0] * moves[0, c] + R[a, 1] * moves[1, c] + R[a, 2] * moves[2, c]
             rows[first + a, column] += along / PLACE_UNIT
-    if angle > demands.cones[knot]:
+    if angle > demands.knots[knot].cone:
         # d angle = (facing x n) . w / sin angle, as the angle is between facing and -n
         scale = 1.0 / max(sin(angle), 1e-3) / CONE_UNIT
         x = (facing[1] * n[2] - facing[2] * n[1]) * scale
         y = (facing[2] * n[0] - facing[0] * n[2]) * scale
         z = (facing[0] * n[1] - facing[1] * n[0]) * scale
         row = rows[first + 3]
-        residual[first + 3] = (angle - INSIDE * demands.cones[knot]) / CONE_UNIT
+        residual[first + 3] = (angle - INSIDE * demands.knots[knot].cone) / CONE_UNIT
         row[nq + 3], row[nq + 4], row[nq + 5] = x, y, z
         for c in range(nq):
             w = times(R, turns[0, c], turns[1, c], turns[2, c])
@@ -169,11 +173,11 @@ def _sphere_rows(
     """Rows of the spheres that are too near, the worst of them; how many, and the worst [m]."""
     worst, depths, count = np.zeros(WORST, dtype=np.int64), np.zeros(WORST), 0
     at, push = np.zeros(3), np.zeros(3)
-    for k in range(len(demands.joints)):
+    for k in range(len(demands.spheres)):
         if demands.asked[knot, k] == -np.inf:
             continue
         _in_world(demands, k, joints_R, joints_p, R, p, at)
-        depth = demands.asked[knot, k] + demands.spheres[k, 3] - _distance(demands, at, push)
+        depth = demands.asked[knot, k] + demands.spheres[k].radius - _distance(demands, at, push)
         if depth <= 0.0:
             continue
         if count < WORST:
@@ -212,9 +216,10 @@ def _push_row(
     # In the hand base frame, where the joints are.
     out = transposed_times(R, push[0], push[1], push[2])
     here = transposed_times(R, at[0] - p[0], at[1] - p[1], at[2] - p[2])
-    j = demands.joints[k]
+    j = demands.spheres[k].joint
     while j > 0:
-        turn, slide, o = chains.angular[j], chains.linear[j], joints_p[j]
+        joint = chains.joints[j]
+        turn, slide, o = joint.angular, joint.linear, joints_p[j]
         w = times(joints_R[j], turn[0], turn[1], turn[2])
         v = times(joints_R[j], slide[0], slide[1], slide[2])
         x, y, z = here[0] - o[0], here[1] - o[1], here[2] - o[2]
@@ -223,16 +228,17 @@ def _push_row(
             + out[1] * (w[2] * x - w[0] * z + v[1])
             + out[2] * (w[0] * y - w[1] * x + v[2])
         )
-        column = demands.columns[knot, chains.q_indices[j]]
-        row[column] -= chains.multipliers[j] * moved / CLEARANCE_UNIT
-        j = chains.parents[j]
+        column = demands.columns[knot, joint.q_index]
+        row[column] -= joint.multiplier * moved / CLEARANCE_UNIT
+        j = joint.parent
 
 
 @compiled_part
 def _in_world(
     demands: Demands, k: int, joints_R: Array, joints_p: Array, R: Array, p: Array, out: Array
 ) -> None:
-    Rj, pj, local = joints_R[demands.joints[k]], joints_p[demands.joints[k]], demands.spheres[k]
+    sphere = demands.spheres[k]
+    Rj, pj, local = joints_R[sphere.joint], joints_p[sphere.joint], sphere.centre
     x = pj[0] + Rj[0, 0] * local[0] + Rj[0, 1] * local[1] + Rj[0, 2] * local[2]
     y = pj[1] + Rj[1, 0] * local[0] + Rj[1, 1] * local[1] + Rj[1, 2] * local[2]
     z = pj[2] + Rj[2, 0] * local[0] + Rj[2, 1] * local[1] + Rj[2, 2] * local[2]
@@ -243,11 +249,11 @@ def _in_world(
 @compiled_part
 def _distance(demands: Demands, at: Array, push: Array) -> float:
     """From the nearer of object and table, and the way out."""
-    R, o = demands.R_WO, demands.p_WO
+    setting = demands.setting[0]
+    R, o, table = setting.R_WO, setting.p_WO, setting.table
     x, y, z = transposed_times(R, at[0] - o[0], at[1] - o[1], at[2] - o[2])
     rho = max(hypot(x, y), 1e-9)
     d, out, up = distance_and_slopes(demands.meridian, rho, z)
-    table = demands.table
     above = table[0] * at[0] + table[1] * at[1] + table[2] * at[2] - table[3]
     for a in range(3):
         push[a] = out * (R[a, 0] * x + R[a, 1] * y) / rho + up * R[a, 2]

@@ -15,7 +15,7 @@ from planner.kinematics.small import clear
 @compiled
 def place_joints(chains: Chains, q: Array, R: Array, p: Array) -> None:
     """Rotations (J, 3, 3) and positions (J, 3) of all joints in the hand base frame."""
-    for j in range(len(chains.parents)):
+    for j in range(len(chains.joints)):
         if j == 0:
             for i in range(3):
                 p[0, i] = 0.0
@@ -28,18 +28,19 @@ def place_joints(chains: Chains, q: Array, R: Array, p: Array) -> None:
 @compiled_part
 def _place(chains: Chains, q: Array, j: int, R: Array, p: Array) -> None:
     """One joint whose parent is in place: fixed pose, then Rodrigues' formula and the slide."""
-    parent, w = chains.parents[j], chains.angular[j]
-    at = chains.multipliers[j] * q[chains.q_indices[j]] + chains.offsets[j]
+    joint = chains.joints[j]
+    parent, w, v = joint.parent, joint.angular, joint.linear
+    at = joint.multiplier * q[joint.q_index] + joint.offset
     s, c, square = sin(at), cos(at), w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
     for i in range(3):
         row = R[parent, i]
-        f0 = _times(row, chains.rotations[j], 0)
-        f1 = _times(row, chains.rotations[j], 1)
-        f2 = _times(row, chains.rotations[j], 2)
+        f0 = _times(row, joint.rotation, 0)
+        f1 = _times(row, joint.rotation, 1)
+        f2 = _times(row, joint.rotation, 2)
         p[j, i] = p[parent, i]
         for k in range(3):
-            p[j, i] += row[k] * chains.positions[j, k]
-        slide = f0 * chains.linear[j, 0] + f1 * chains.linear[j, 1] + f2 * chains.linear[j, 2]
+            p[j, i] += row[k] * joint.position[k]
+        slide = f0 * v[0] + f1 * v[1] + f2 * v[2]
         p[j, i] += at * slide
         along = f0 * w[0] + f1 * w[1] + f2 * w[2]
         keep = 1.0 - (1.0 - c) * square
@@ -61,12 +62,13 @@ def place_pad(
     chains: Chains, finger: int, R: Array, p: Array, centre: Array, normal: Array
 ) -> None:
     """A pad's centre and normal (3,) in the hand base frame, its joints being in place."""
-    j = chains.pad_joints[finger]
+    pad = chains.pads[finger]
+    j = pad.joint
     for i in range(3):
         centre[i], normal[i] = p[j, i], 0.0
         for k in range(3):
-            centre[i] += R[j, i, k] * chains.pad_centres[finger, k]
-            normal[i] += R[j, i, k] * chains.pad_normals[finger, k]
+            centre[i] += R[j, i, k] * pad.centre[k]
+            normal[i] += R[j, i, k] * pad.normal[k]
 
 
 @compiled
@@ -81,8 +83,9 @@ def place_ball(
         centre: (3,) of the ball (`hand_models.dome`, b).
         turning: (3, 3) db/du, by which it goes along with the direction; zero for a sphere.
     """
-    j, A, u, e = chains.pad_joints[finger], chains.dome_spreads[finger], np.zeros(3), np.zeros(3)
-    more, stretch = chains.dome_radii[finger], 0.0
+    pad = chains.pads[finger]
+    j, A, u, e = pad.joint, pad.dome_spread, np.zeros(3), np.zeros(3)
+    more, stretch = pad.dome_more, 0.0
     for i in range(3):
         for k in range(3):
             u[i] += R[j, k, i] * facing[k]
@@ -97,7 +100,7 @@ def place_ball(
     for i in range(3):
         centre[i] = p[j, i]
         for k in range(3):
-            centre[i] += R[j, i, k] * (chains.dome_centres[finger, k] + e[k] + more * u[k])
+            centre[i] += R[j, i, k] * (pad.dome_centre[k] + e[k] + more * u[k])
             local[i, k] = scale * (A[i, k] - e[i] * e[k]) + (more if i == k else 0.0)
     for i in range(3):
         for k in range(3):
@@ -135,12 +138,13 @@ def pad_jacobian(
     for j in chains.supports[finger]:
         if j < 0:
             break
-        q, times = chains.q_indices[j], chains.multipliers[j]
+        joint = chains.joints[j]
+        q, times = joint.q_index, joint.multiplier
         w0, w1, w2 = 0.0, 0.0, 0.0
         for k in range(3):
-            w0 += times * R[j, 0, k] * chains.angular[j, k]
-            w1 += times * R[j, 1, k] * chains.angular[j, k]
-            w2 += times * R[j, 2, k] * chains.angular[j, k]
+            w0 += times * R[j, 0, k] * joint.angular[k]
+            w1 += times * R[j, 1, k] * joint.angular[k]
+            w2 += times * R[j, 2, k] * joint.angular[k]
         a0, a1, a2 = centre[0] - p[j, 0], centre[1] - p[j, 1], centre[2] - p[j, 2]
         turns[0, q] += w0
         turns[1, q] += w1
@@ -150,4 +154,4 @@ def pad_jacobian(
         moves[2, q] += w0 * a1 - w1 * a0
         for i in range(3):
             for k in range(3):
-                moves[i, q] += times * R[j, i, k] * chains.linear[j, k]
+                moves[i, q] += times * R[j, i, k] * joint.linear[k]

@@ -29,7 +29,7 @@ def pull(
         targets: Of the centre of the ball that touches so, in the hand base frame, (K, 3) [m].
         centres, normals: Of that ball and of the pad, where they came to, (K, 3).
     """
-    nq, J = path.shape[1], len(chains.parents)
+    nq, J = path.shape[1], len(chains.joints)
     R, p = np.zeros((J, 3, 3)), np.zeros((J, 3))
     moves, turns = np.zeros((3, nq)), np.zeros((3, nq))
     turning, system, lower = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))

@@ -46,13 +46,13 @@ def rest(
         q, R, p: (N, nq), (N, 3, 3), (N, 3) joints and base in the object frame: start, then end.
         places: (N, m, 4) for theta, z, gap and angle of each pad at the end.
     """
-    m, nq, J = fingers.shape[1], q.shape[1], len(chains.parents)
+    m, nq, J = fingers.shape[1], q.shape[1], len(chains.joints)
     joints_R, joints_p = np.zeros((J, 3, 3)), np.zeros((J, 3))
     pads, jacobians = np.zeros((m, 4, 3)), np.zeros((m, 2, 3, nq))  # centre, normal, n, about that
     rows, residual = np.zeros((ROWS * m, nq + 6)), np.zeros(ROWS * m)
     system, lower = np.zeros((ROWS * m, ROWS * m)), np.zeros((ROWS * m, ROWS * m))
     step = np.zeros(nq + 6)
-    looks = 1 if np.all(chains.dome_spreads == 0.0) else 2  # a dome again along what it met
+    looks = 2 if chains.domed else 1  # a dome again along what it met
     for i in range(len(q)):
         place_joints(chains, q[i], joints_R, joints_p)
         _face(chains, fingers[i], R[i], joints_R, joints_p, pads)
@@ -138,7 +138,7 @@ def _residuals(
         n = pads[k, 2]
         n[0], n[1], n[2] = centre[0] / rho / w, centre[1] / rho / w, -dr / w
         _halfway(n, pads[k, 3])
-        gap = ((rho - r) - dr * (centre[2] - z)) / w - chains.pad_radii[fingers[k]]
+        gap = ((rho - r) - dr * (centre[2] - z)) / w - chains.pads[fingers[k]].radius
         cosine = -(pad[0] * n[0] + pad[1] * n[1] + pad[2] * n[2])
         angle = acos(min(max(cosine, -1.0), 1.0))
         places[k, 0], places[k, 1], places[k, 2], places[k, 3] = atan2(n[1], n[0]), z, gap, angle

@@ -41,7 +41,7 @@ def settle(
 
     An angle beyond the cone counts as its arc of 50 mm.
     """
-    K, k = len(q), len(demands.fingers)
+    K, k = len(q), len(demands.contacts)
     unknowns = len(demands.willing)
     rows = np.zeros((K * (4 * k + WORST), unknowns))
     residual, lower = np.zeros(len(rows)), np.zeros((len(rows), len(rows)))
@@ -50,14 +50,14 @@ def settle(
     middle = np.zeros(3)
     for i in range(3):
         for j in range(k):
-            middle[i] += demands.points[j, i] / k
+            middle[i] += demands.contacts[j].point[i] / k
     _turn_back(demands, R)
-    share, last, domed = 1.0, np.inf, np.any(chains.dome_spreads != 0.0)
+    share, last = 1.0, np.inf
     for turn in range(iterations + 1):
         used, off = write_rows(chains, demands, q, R, p, middle, rows, residual)
         if off < CLOSE or turn == iterations:
             break
-        if domed and turn > PATIENT and off > last:
+        if chains.domed and turn > PATIENT and off > last:
             share = max(0.5 * share, LEAST_SHARE)
         last = off
         _step(chains, demands, q, p, rows, residual, used, system, lower, dual, free, step)
@@ -114,8 +114,8 @@ def _freeze(chains: Chains, demands: Demands, q: Array, p: Array, step: Array, f
             if stopped and free[column] > 0.0:
                 free[column], found = 0.0, True
     for a in range(3):
-        stopped = (step[nq + a] > 0.0 and p[a] >= demands.box[1, a]) or (
-            step[nq + a] < 0.0 and p[a] <= demands.box[0, a]
+        stopped = (step[nq + a] > 0.0 and p[a] >= demands.setting[0].box[1, a]) or (
+            step[nq + a] < 0.0 and p[a] <= demands.setting[0].box[0, a]
         )
         if stopped and free[nq + a] > 0.0:
             free[nq + a], found = 0.0, True
@@ -138,13 +138,13 @@ def _take(
     _turn_back(demands, R)
     for a in range(3):
         moved = middle[a] + arm[a] + step[nq + a]
-        p[a] = min(max(moved, demands.box[0, a]), demands.box[1, a])
+        p[a] = min(max(moved, demands.setting[0].box[0, a]), demands.setting[0].box[1, a])
 
 
 @compiled_part
 def _turn_back(demands: Demands, R: Array) -> None:
     """Onto the largest turn from nominal, where it is beyond."""
-    nominal, trace = demands.R_nominal, 0.0
+    nominal, most, trace = demands.setting[0].R_nominal, demands.setting[0].most_turn, 0.0
     w0 = w1 = w2 = 0.0  # in the world: of R R_nominal^T
     for k in range(3):
         for a in range(3):
@@ -153,6 +153,6 @@ def _turn_back(demands: Demands, R: Array) -> None:
         w1 += R[0, k] * nominal[2, k] - R[2, k] * nominal[0, k]
         w2 += R[1, k] * nominal[0, k] - R[0, k] * nominal[1, k]
     angle = acos(min(max(0.5 * (trace - 1.0), -1.0), 1.0))
-    if demands.most_turn < angle < HALF_TURN:
-        back = (demands.most_turn - angle) / (2.0 * sin(angle))
+    if most < angle < HALF_TURN:
+        back = (most - angle) / (2.0 * sin(angle))
         turn_by(back * w0, back * w1, back * w2, R)

@@ -31,7 +31,7 @@ HEIGHT = 0.16  # of the cylinders [m]
 LAID = 2400  # postures that are laid onto each
 GAP = 1e-3  # of a laid pad from the cylinder [m]
 
-_VERSION = 3  # of all this; part of the cache's key
+_VERSION = 4  # of all this; part of the cache's key
 _HALF_TURN = np.diag([1.0, -1.0, -1.0])
 
 

@@ -13,10 +13,10 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from estimator.vectors import Array
-from hand_models.chains import chains_of
+from hand_models.chains import chains_of, records
 from hand_models.hand import Hand
 from hand_models.spheres import LinkSpheres
-from planner.kinematics.demands import Demands
+from planner.kinematics.demands import CONTACT, KNOT, SETTING, SPHERE, Demands
 from planner.kinematics.settling import BASE_UNITS, settle
 from planner.reaching.reach_kinematics import LENGTH
 from planner.reaching.reach_model import BESIDE_PAD
@@ -86,18 +86,18 @@ def _settled(
         R = np.array(workspace.X_WB.rotation)
     chains, q = chains_of(hand), np.repeat(start.q[None], len(lengths), axis=0)
     cones = [options.cone, *[max(options.cone, options.off_contact_cone)] * (len(lengths) - 1)]
+    box = _box(task, start)
     demands = Demands(
-        fingers=rows, points=np.array(task.points), normals=np.array(task.normals),
-        lengths=np.array(lengths), cones=np.array(cones),
-        R_WO=np.ascontiguousarray(task.solid.X_WO.rotation), p_WO=task.solid.X_WO.translation,
+        contacts=records(CONTACT, finger=rows, point=task.points, normal=task.normals),
+        knots=records(KNOT, length=lengths, cone=cones),
+        setting=_setting(task, box, R),
         meridian=task.solid.meridian,
-        table=np.array(NO_TABLE if options.table is None else options.table),
-        joints=np.asarray(spheres.joints), asked=_asked(hand, spheres, task, rows, knots),
-        spheres=np.column_stack([spheres.centres, spheres.radii]),
-        columns=knots.columns, willing=_willing(hand, task, knots), box=_box(task, start),
-        R_nominal=_nominal(task, R), most_turn=_most_turn(task),
-    )  # fmt: skip
-    np.clip(p, *demands.box, out=p)
+        spheres=records(SPHERE, joint=spheres.joints, centre=spheres.centres, radius=spheres.radii),
+        asked=_asked(hand, spheres, task, rows, knots),
+        columns=knots.columns,
+        willing=_willing(hand, task, knots),
+    )
+    np.clip(p, *box, out=p)
     left = settle(chains, demands, q, R, p, ITERATIONS)
     none = np.zeros(len(rows))
     return Solution(
@@ -147,6 +147,15 @@ def _willing(hand: Hand, task: ReachTask, knots: _Knots) -> Array:
     out[nq : nq + 3] = BASE_UNITS[0] if free or workspace.position_range > 0.0 else 0.0
     out[nq + 3 : nq + 6] = BASE_UNITS[1] if free or workspace.rotation_range > 0.0 else 0.0
     return out
+
+
+def _setting(task: ReachTask, box: Array, R_start: Array) -> NDArray[np.void]:
+    table = NO_TABLE if task.options.table is None else task.options.table
+    X_WO = task.solid.X_WO
+    return records(
+        SETTING, R_WO=[X_WO.rotation], p_WO=X_WO.translation, table=table, box=box,
+        R_nominal=_nominal(task, R_start), most_turn=_most_turn(task),
+    )  # fmt: skip
 
 
 def _nominal(task: ReachTask, R_start: Array) -> Array:
