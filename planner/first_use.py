@@ -38,7 +38,8 @@ def compile_ahead(hand: Hand, options: PlannerOptions | None = None) -> None:
         return
     other = _other_process()
     try:
-        compile_kinematics(hand, options or PlannerOptions())
+        with first_use.uncollected():
+            compile_kinematics(hand, options or PlannerOptions())
     finally:
         if other is not None:
             other.wait()
