@@ -127,7 +127,7 @@ def _best_placement(
     samples = sample_objects(belief, options.objects, rng=rng)
     worth = Worth(
         belief, samples, sensor, goal, options.grasp_height,
-        untold=options.offset_guard, pad=tools.pad,
+        untold=options.offset_guard, pad=tools.pad, hand=tools.hand,
     )  # fmt: skip
     rank_all = partial(
         rank, worth=worth, margin=options.margin, criterion=options.criterion, rng=rng
@@ -150,7 +150,8 @@ def _best_placement(
         if isinstance(made, _Made):
             funnel += _refused(count, failures)
             plan = _plan(belief.surface, sensor, candidates, ranking, i, made, funnel)
-            return _judged(plan, worth, ranking, i, scored, options, rng)
+            fingers = candidates.fingers[i]
+            return _judged(plan, fingers, worth, ranking, i, scored, options, rng)
         failures[i] = made
     return funnel + _refused(count, failures)
 
@@ -163,6 +164,7 @@ def _refused(count: int, failures: dict[int, str]) -> Funnel:
 
 def _judged(
     plan: Plan,
+    fingers: Index,
     worth: Worth,
     ranking: Ranking,
     i: int,
@@ -174,11 +176,14 @@ def _judged(
     others = sample_objects(worth.belief, RISK_OBJECTS, rng=rng.spawn(1)[0])
     theta, z = np.array([(probe.place.theta, probe.place.z) for probe in plan.probes]).T
     unseen = replace(worth, samples=others)
-    found = risks(unseen, theta, z, margin=options.margin)
+    reach = plan.reach
+    place = worth.belief.surface.at(theta[None], z[None])
+    shapes = worth.shapes(place, fingers[None], reach.q[None], np.array(reach.X_WB.rotation)[None])
+    found = risks(unseen, theta, z, margin=options.margin, shapes=shapes)
     if not options.certify:
         return replace(plan, risks=found)
     choice = certificate(worth, ranking, i, scored=scored, margin=options.margin)
-    choice = replace(choice, unseen=value_at(unseen, theta, z))
+    choice = replace(choice, unseen=value_at(unseen, theta, z, shapes))
     return replace(plan, risks=found, choice=choice)
 
 

@@ -9,9 +9,10 @@ from estimator.prior import coarse_prior
 from estimator.sensors import SENSORS
 from hand_models import load_hand
 from planner.goal import Goal
-from planner.motions.motion import SPACING, approach_by_base
+from planner.motions.motion import approach_by_base
 from planner.options import PlannerOptions
 from planner.plan import plan_probes
+from planner.reaching.straight_way import SPACING
 
 AXIS = Axis(np.array([0.5, 0.1, 0.2]), np.array([0.1, -0.2, 0.9]))
 HAND = load_hand("allegro_right")

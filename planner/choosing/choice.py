@@ -95,7 +95,8 @@ def rank(
     """
     belief, noise, goal = worth.belief, worth.noise, worth.goal
     place = belief.surface.at(candidates.theta, candidates.z)
-    landed = worth.landed(place)
+    shapes = worth.shapes(place, candidates.fingers, candidates.q, candidates.R_WB)
+    landed = worth.landed(place, shapes)
     after = worth.covariances(landed)
     value, angle, offset = _expected_error(after)
     bound, best_bound = _pair_bound(candidates.theta, place, noise)

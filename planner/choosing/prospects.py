@@ -15,8 +15,10 @@ from estimator.side_by_side import in_shares
 from estimator.singular import PlacedTriples
 from estimator.surface import Geometry, geometry_at
 from estimator.vectors import Array, Mask
+from planner.choosing.pad_shapes import PadShapes
 from planner.choosing.sampled_surfaces import SampledSurfaces
 from planner.kinematics.meeting import MET, fill_met
+from planner.kinematics.meeting_domes import fill_met_by_domes
 
 BEFORE, BEHIND = 0.030, 0.025  # how far an approach goes, about the expected contact [m]
 STEPS = 6
@@ -49,16 +51,19 @@ class Prospects:
         return PlacedTriples(self.theta, self.z, self.r, self.dr, self.ddr)
 
 
-def prospects(samples: SampledObjects, p_W: Array, n_W: Array, *, pad: float) -> Prospects:
+def prospects(
+    samples: SampledObjects, p_W: Array, n_W: Array, *, pad: float, shapes: PadShapes | None = None
+) -> Prospects:
     """Follow pads along -n to each sampled object.
 
     Args:
         p_W, n_W: Expected contacts and outward normals, (N, m, 3) [m], unit.
         pad: Radius of the pads; zero for points [m].
+        shapes: Of pads that are domes; on rims they are taken for balls all the same.
     """
     B, (N, m) = len(samples.points), p_W.shape[:2]
     surfaces = SampledSurfaces(samples)
-    met = _met(surfaces, p_W.reshape(-1, 3), n_W.reshape(-1, 3), pad)
+    met = _met(surfaces, p_W.reshape(-1, 3), n_W.reshape(-1, 3), pad, shapes)
     s, theta, gap, height, dr, ddr = np.moveaxis(met, -1, 0)
     low, high = surfaces.profiles.z_range
     hit = (gap < MET) & (s > -BEFORE) & (s < BEHIND) & (height >= low) & (height <= high)
@@ -71,18 +76,21 @@ def prospects(samples: SampledObjects, p_W: Array, n_W: Array, *, pad: float) ->
     )
 
 
-def _met(surfaces: SampledSurfaces, p: Array, n: Array, pad: float) -> Array:
+def _met(
+    surfaces: SampledSurfaces, p: Array, n: Array, pad: float, shapes: PadShapes | None
+) -> Array:
     """What pads on lines p - s n (M, 3) meet, (B, M, 6) as `fill_met` has it."""
     objects, met = surfaces.objects, np.zeros((len(surfaces.objects.points), len(p), 6))
     z, pieces, origins = np.asarray(objects.z), surfaces.profiles.coefficients, objects.points
-    lines = (np.ascontiguousarray(p), np.ascontiguousarray(n), np.full(len(p), pad))
+    lines = (np.ascontiguousarray(p), np.ascontiguousarray(n))
     range_s = np.array([-1.5 * BEFORE, 1.5 * BEHIND])
 
     def meet(part: slice) -> None:
-        fill_met(
-            z, pieces[part], origins[part], surfaces.frames[part], *lines, range_s, STEPS, EDGE,
-            met[part],
-        )  # fmt: skip
+        some = (z, pieces[part], origins[part], surfaces.frames[part], *lines)
+        fill_met(*some, np.full(len(p), pad), range_s, STEPS, EDGE, met[part])
+        if shapes is not None:
+            domes = (shapes.balls.ravel(), shapes.spreads.reshape(-1, 3, 3))
+            fill_met_by_domes(*some, *domes, shapes.spins.reshape(-1, 3), range_s, met[part])
 
     in_shares(meet, len(met))
     return met

@@ -15,6 +15,7 @@ from estimator.prior import AxisPrior
 from estimator.singular import SINGULARITIES, margins
 from estimator.surface import Geometry
 from estimator.vectors import Array
+from planner.choosing.pad_shapes import PadShapes
 from planner.choosing.prospects import Prospects, with_earlier
 from planner.choosing.worth import Worth
 
@@ -37,7 +38,9 @@ class Risk:
     chance: float
 
 
-def risks(worth: Worth, theta: Array, z: Array, *, margin: float) -> tuple[Risk, ...]:
+def risks(
+    worth: Worth, theta: Array, z: Array, *, margin: float, shapes: PadShapes | None = None
+) -> tuple[Risk, ...]:
     """Every risk of at least 5 %, the likeliest first.
 
     Singularities count within the margin, of the triple that the touches make with the contacts
@@ -46,9 +49,10 @@ def risks(worth: Worth, theta: Array, z: Array, *, margin: float) -> tuple[Risk,
     Args:
         worth: With objects that the touches were not chosen by.
         theta, z: Their places on the believed surface, (m,).
+        shapes: Of the pads, of one placement.
     """
     place = worth.belief.surface.at(theta[None], z[None])
-    landed = worth.landed(place)
+    landed = worth.landed(place, shapes)
     found = [Risk(MISSED, float(np.mean(~landed.hit.all(axis=(1, 2)))))]
     earlier = np.array([c.position for c in worth.belief.contacts]).reshape(-1, 3)
     triples = with_earlier(landed, worth.samples, earlier)

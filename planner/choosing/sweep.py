@@ -71,7 +71,7 @@ def swept(
     all_reached = [
         _reached(hand, postures, surface, candidates, i, cone, rng) for i in placements.tolist()
     ]
-    information = _information(worth, all_reached)
+    information = _information(worth, postures, candidates.R_WB[placements], all_reached)
     found, scored, first = [candidates.take(np.zeros(0, dtype=np.intp))], 0, 0
     for i, reached in zip(placements.tolist(), all_reached, strict=True):
         triples = _triples(reached.finger, len(hand.fingers))
@@ -164,11 +164,18 @@ def _triples(finger: Index, fingers: int) -> Index:
     return np.concatenate(grids).astype(np.intp)
 
 
-def _information(worth: Worth, all_reached: list[_Reached]) -> Array:
+def _information(
+    worth: Worth, postures: Postures, R_WB: Array, all_reached: list[_Reached]
+) -> Array:
     """Of all places of all placements, one after another, (B, G, 5, 5)."""
-    theta, z = (np.concatenate([getattr(r, x) for r in all_reached]) for x in ("theta", "z"))
+    finger, posture, theta, z = (
+        np.concatenate([getattr(reached, name) for reached in all_reached])
+        for name in ("finger", "posture", "theta", "z")
+    )
+    R = np.repeat(R_WB, [len(reached.finger) for reached in all_reached], axis=0)
     place = worth.belief.surface.at(theta[:, None], z[:, None])
-    return worth.information(worth.landed(place))[:, :, 0]
+    shapes = worth.shapes(place, finger[:, None], postures.q[posture], R)
+    return worth.information(worth.landed(place, shapes))[:, :, 0]
 
 
 def _best(scores: Array, count: int) -> Index:

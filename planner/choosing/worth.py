@@ -13,7 +13,9 @@ from estimator.side_by_side import in_shares
 from estimator.singular import margins
 from estimator.surface import Geometry
 from estimator.triple_scores import in_goals
-from estimator.vectors import Array
+from estimator.vectors import Array, Index
+from hand_models.hand import Hand
+from planner.choosing.pad_shapes import PadShapes, pad_shapes
 from planner.choosing.prospects import Prospects, prospects, with_earlier
 from planner.goal import Goal
 
@@ -30,7 +32,8 @@ class Worth:
             [m], from the axis' point.
         untold: Sd of a common rotation of the directions that the expected error reckons with
             beside what the sensor admits [rad]: the estimator will not know of it.
-        pad: Radius of the hand's pads [m].
+        pad: Radius of the hand's pads, or of the spheres that stand for them [m].
+        hand: Whose pads touch, where a posture says how they lie.
     """
 
     belief: Belief
@@ -40,15 +43,20 @@ class Worth:
     height: float = 0.0
     untold: float = 0.0
     pad: float = 0.0
+    hand: Hand | None = None
 
     @property
     def before(self) -> Array:
         """What is known already, in goals, (5, 5)."""
         return self._scaled(known_before(self.belief.covariance, self.noise.direction_offset))
 
-    def landed(self, place: Geometry) -> Prospects:
-        """Touches planned at places (N, m), on each object."""
-        return prospects(self.samples, place.p, place.n, pad=self.pad)
+    def landed(self, place: Geometry, shapes: PadShapes | None = None) -> Prospects:
+        """Touches planned at places (N, m), on each object; without shapes they are of balls."""
+        return prospects(self.samples, place.p, place.n, pad=self.pad, shapes=shapes)
+
+    def shapes(self, place: Geometry, fingers: Index, q: Array, R_WB: Array) -> PadShapes | None:
+        """Of the hand's pads that touch at places (N, m), see `pad_shapes`."""
+        return None if self.hand is None else pad_shapes(self.hand, fingers, q, R_WB, place.n)
 
     def information(self, landed: Prospects) -> Array:
         """Of each touch on each object, zero where it misses, in goals, (B, N, m, 5, 5)."""

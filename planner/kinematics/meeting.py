@@ -82,7 +82,7 @@ def _meet_wall(
     s, h = 0.0, p[2]
     for _ in range(steps):
         x, y, z = _back(p, n, s)
-        r, dr, ddr = _wall(heights, pieces, h)
+        r, dr, ddr = wall_at(heights, pieces, h)
         R, Z, dZ = _offset(r, dr, ddr, h, pad)
         across = hypot(x, y) - R - dr * (z - Z)
         theta = atan2(y, x)
@@ -91,7 +91,7 @@ def _meet_wall(
         rise = (z - (stop - s) * n[2] - Z) / max(dZ, FLATTEST)
         s, h = stop, h + min(max(rise, -LONGEST), LONGEST)
     x, y, z = _back(p, n, s)
-    r, dr, ddr = _wall(heights, pieces, h)
+    r, dr, ddr = wall_at(heights, pieces, h)
     R, Z, _ = _offset(r, dr, ddr, h, pad)
     met[0], met[1], met[2] = s, atan2(y, x), hypot(hypot(x, y) - R, z - Z)
     met[3], met[4], met[5] = h, dr, ddr
@@ -105,7 +105,7 @@ def _meet_rim(
     """The rim of the end that the wall was left beyond."""
     top = met[3] > heights[-1]
     end = heights[-1] if top else heights[0]
-    r, dr, _ = _wall(heights, pieces, end)
+    r, dr, _ = wall_at(heights, pieces, end)
     s = _along_to_rim(r, end, pad, p, n, range_s, 2 * steps)
     x, y, z = _back(p, n, s)
     out, up = hypot(x, y) - r, z - end
@@ -143,7 +143,7 @@ def _offset(r: float, dr: float, ddr: float, h: float, pad: float) -> V3:
 
 
 @compiled_part
-def _wall(heights: Array, pieces: Array, z: float) -> V3:
+def wall_at(heights: Array, pieces: Array, z: float) -> V3:
     """Radius and its derivatives; beyond the ends straight on."""
     last = len(heights) - 1
     inside = min(max(z, heights[0]), heights[last])

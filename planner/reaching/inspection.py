@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 
 _RETREATED = (0.33, 0.67, 1.0)  # shares of an arm's retreat that are checked
 _OUT_OF_RANGE = 1e-5  # of the base [m]
+_ROUNDED = 1e-6  # of lengths [m]
 _PRESSED = (0.0, 0.25, 0.5, 0.75, 1.0)  # shares of a finger's overshoot that are checked
 
 
@@ -53,7 +54,8 @@ def inspect(hand: Hand, collision: HandCollision, task: ReachTask, found: Soluti
         said.extend(f"at stand-off: {fault}" for fault in wrong)
     for share in (0.0, *shares):
         said.extend(_room_faults(hand, collision, options, found, share))
-    if not by_arm and np.any(found.overshoot):
+    if not by_arm and np.any(found.standoff):
+        said.extend(_way_faults(options, found))
         said.extend(_pressing_faults(hand, collision, options, found))
     return Inspection(at, before, tuple(said))
 
@@ -110,6 +112,17 @@ def _room_faults(
             yield gap_in_words(link)
         elif anything.distance < 0.0:
             yield gap_in_words(anything)
+
+
+def _way_faults(options: ReachOptions, found: Solution) -> Iterator[str]:
+    """Fingers whose straight way is too short, before the contact or behind it."""
+    ends = (("before", found.standoff, options.least_standoff),
+            ("behind", found.overshoot, options.least_overshoot))  # fmt: skip
+    for where, lengths, least in ends:
+        for name, length in zip(found.fingers, lengths.tolist(), strict=True):
+            if length < least - _ROUNDED:
+                goes = f"{1e3 * length:.1f} mm {where} its contact ({1e3 * least:.0f} asked)"
+                yield f"{name}: goes straight for {goes}"
 
 
 def _pressing_faults(

@@ -26,6 +26,7 @@ from planner.reaching.reach_task import ReachOptions, ReachTask, Solution, solve
 from planner.reaching.settled import SOLVED, settled
 from planner.reaching.solid import RevolvedSolid
 from planner.reaching.starts import Start, StartSearch
+from planner.reaching.straight import straightened
 
 __all__ = ["Reach", "ReachOptions", "ReachSolver", "Unreachable"]
 
@@ -162,6 +163,8 @@ class ReachSolver:
         """A solution that holds as a reach, else as it is."""
         if not solution.violation < SOLVED:
             return solution
+        if np.any(solution.overshoot):
+            solution = straightened(self.hand, task, solution)
         found = inspect(self.hand, self._collision, task, solution)
         if found.faults:
             return solution

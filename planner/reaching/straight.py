@@ -10,9 +10,31 @@ from estimator.vectors import Array
 from hand_models.hand import Hand
 from planner.reaching.pull import pulled
 from planner.reaching.reach_task import ReachTask, Solution
+from planner.reaching.straight_way import Way, straight_way
 
 _STEP = 2.5e-3  # along the normal [m]
 _ON_LINE = 2e-5  # of the pad's centre [m]
+
+
+def straightened(hand: Hand, task: ReachTask, found: Solution) -> Solution:
+    """A solution whose fingers stand off and press on only as far as a straight way leads there."""
+    ways = [
+        straight_way(hand, found, i, task.points[i], task.normals[i])
+        for i in range(len(found.fingers))
+    ]
+    if all(way.is_whole for way in ways):
+        return found
+    return replace(
+        found,
+        q_standoff=_joined(hand, found, found.q_standoff, [_end(way, way.first) for way in ways]),
+        q_overshoot=_joined(hand, found, found.q_overshoot, [_end(way, way.last) for way in ways]),
+        standoff=np.array([way.along[way.first] for way in ways]),
+        overshoot=np.array([-way.along[way.last] for way in ways]),
+    )
+
+
+def _end(way: Way, k: int) -> tuple[float, Array]:
+    return float(way.along[k]), way.path[k]
 
 
 def extended(hand: Hand, task: ReachTask, found: Solution) -> Solution:
