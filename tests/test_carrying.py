@@ -155,8 +155,8 @@ def test_a_surprise_that_nothing_has_confirmed_is_still_open_after_a_stop():
         rng=np.random.default_rng(0), options=OPTIONS, move=robot.move,
     ):  # fmt: skip
         seen.append(step)
-        if step.surprise is not None:
-            robot.stops, robot.feels = 1, False
+        if step.surprise is not None and step.stop is None:
+            robot.stops, robot.phase, robot.feels = 1, "transfer", False
     surprised = next(k for k, step in enumerate(seen) if step.surprise is not None)
     assert not seen[surprised].settled
     assert seen[surprised + 1].stop is not None

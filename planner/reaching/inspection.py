@@ -121,8 +121,8 @@ def _way_faults(options: ReachOptions, found: Solution) -> Iterator[str]:
     for where, lengths, least in ends:
         for name, length in zip(found.fingers, lengths.tolist(), strict=True):
             if length < least - _ROUNDED:
-                goes = f"{1e3 * length:.1f} mm {where} its contact ({1e3 * least:.0f} asked)"
-                yield f"{name}: goes straight for {goes}"
+                short = f"{1e3 * (least - length):.1f} mm too short {where} its contact"
+                yield f"{name}: its straight way is {short}"
 
 
 def _pressing_faults(
