@@ -76,8 +76,8 @@ def chains_of(hand: Hand) -> Chains:
 def records(kind: np.dtype[np.void], **columns: ArrayLike) -> NDArray[np.void]:
     """N records, from a column for each of their fields, the first of them of N rows."""
     out = np.zeros(len(np.asarray(next(iter(columns.values())))), dtype=kind)
-    for name in kind.fields or ():
-        out[name] = columns[name]
+    for name, column in columns.items():
+        out[name] = column
     return out
 
 

@@ -18,7 +18,7 @@ from estimator.vectors import Index, frozen
 from hand_models.hand import Hand
 from planner.candidates import Candidates
 from planner.choosing.choice import Ranking, rank
-from planner.choosing.optimum import certificate, value_at
+from planner.choosing.optimum import certificate, value_of
 from planner.choosing.risk import risks
 from planner.choosing.sweep import FROM, swept, with_swept
 from planner.choosing.worth import Worth
@@ -176,14 +176,15 @@ def _judged(
     others = sample_objects(worth.belief, RISK_OBJECTS, rng=rng.spawn(1)[0])
     theta, z = np.array([(probe.place.theta, probe.place.z) for probe in plan.probes]).T
     unseen = replace(worth, samples=others)
-    reach = plan.reach
-    place = worth.belief.surface.at(theta[None], z[None])
+    reach, place = plan.reach, worth.belief.surface.at(theta[None], z[None])
     shapes = worth.shapes(place, fingers[None], reach.q[None], np.array(reach.X_WB.rotation)[None])
-    found = risks(unseen, theta, z, margin=options.margin, shapes=shapes)
+    behind = np.array([[probe.approach.overshoot for probe in plan.probes]])
+    landed = unseen.landed(place, shapes, behind=behind)
+    found = risks(unseen, landed, margin=options.margin)
     if not options.certify:
         return replace(plan, risks=found)
     choice = certificate(worth, ranking, i, scored=scored, margin=options.margin)
-    choice = replace(choice, unseen=value_at(unseen, theta, z, shapes))
+    choice = replace(choice, unseen=value_of(unseen, landed))
     return replace(plan, risks=found, choice=choice)
 
 

@@ -106,15 +106,21 @@ def test_only_one_to_three_touches_have_a_grid():
         best_touches(held, place_grid(held.belief.surface), 4, margin=MARGIN)
 
 
+def landed(held, theta_deg, z_mm, **options):
+    z = 1e-3 * np.array([z_mm])
+    return held.landed(held.belief.surface.at(np.deg2rad([theta_deg]), z), **options)
+
+
 def told(held, theta_deg, z_mm):
-    found = risks(held, np.deg2rad(theta_deg), 1e-3 * np.array(z_mm), margin=MARGIN)
+    found = risks(held, landed(held, theta_deg, z_mm), margin=MARGIN)
     return {risk.name: risk.chance for risk in found}
 
 
 def test_a_shared_parallel_that_the_belief_makes_likely_is_said():
     """Heights 5 mm apart on a cylinder and a tilt of ten degrees: often one parallel after all."""
     short = worth(1, angle=12.0, z_range=(-0.02, 0.02), objects=60)
-    found = risks(short, np.deg2rad([0.0, 100.0, 230.0]), np.array([-3e-3, 0.0, 3e-3]), margin=0.15)
+    touches = landed(short, [0.0, 100.0, 230.0], [-3.0, 0.0, 3.0])
+    found = risks(short, touches, margin=0.15)
     names = [risk.name for risk in found]
     assert any("parallel" in name or "meet on the axis" in name for name in names)
     assert all(risk.chance >= 0.05 for risk in found)
@@ -137,6 +143,16 @@ def test_chances_are_shares_of_the_objects():
     )
     landed = held.landed(place)
     assert chance == pytest.approx(np.mean(~landed.hit[:, 0].all(axis=1)))
+
+
+def test_a_finger_that_cannot_press_on_behind_its_contact_misses_what_is_farther_away():
+    held, chances = worth(5, offset=6e-3, objects=60), []
+    for behind in (0.025, np.array([[0.025, 0.025, 0.0]])):
+        touches = landed(held, (0, 120, 240), (-25, 0, 25), behind=behind)
+        found = {risk.name: risk.chance for risk in risks(held, touches, margin=MARGIN)}
+        chances.append(found.get(MISSED, 0.0))
+    assert chances[0] < 0.2
+    assert 0.3 < chances[1] < 0.7
 
 
 def test_labels_that_stay_ambiguous_are_said():

@@ -21,7 +21,6 @@ from estimator.triple_scores import triple_scores
 from estimator.vectors import Array, Index, frozen
 from planner.candidates import END_MARGIN
 from planner.choosing.choice import Ranking
-from planner.choosing.pad_shapes import PadShapes
 from planner.choosing.prospects import Prospects
 from planner.choosing.worth import Worth
 
@@ -181,10 +180,9 @@ def refined(worth: Worth, optimum: Optimum, grid: Grid, *, margin: float) -> flo
     return np.inf if best is None else float(np.exp(scores[order[best]]))
 
 
-def value_at(worth: Worth, theta: Array, z: Array, shapes: PadShapes | None = None) -> float:
-    """Expected error after touches at places (m,) with pads of one placement, in goals."""
-    place = worth.belief.surface.at(theta[None], z[None])
-    after = worth.covariances(worth.landed(place, shapes))[:, 0]
+def value_of(worth: Worth, landed: Prospects) -> float:
+    """Expected error after the touches of one placement (B, 1, m), in goals."""
+    after = worth.covariances(landed)[:, 0]
     return float(np.exp(0.5 * np.log(np.einsum("bii->b", after)).mean()))
 
 

@@ -52,7 +52,13 @@ class Prospects:
 
 
 def prospects(
-    samples: SampledObjects, p_W: Array, n_W: Array, *, pad: float, shapes: PadShapes | None = None
+    samples: SampledObjects,
+    p_W: Array,
+    n_W: Array,
+    *,
+    pad: float,
+    shapes: PadShapes | None = None,
+    behind: Array | float = BEHIND,
 ) -> Prospects:
     """Follow pads along -n to each sampled object.
 
@@ -60,13 +66,15 @@ def prospects(
         p_W, n_W: Expected contacts and outward normals, (N, m, 3) [m], unit.
         pad: Radius of the pads; zero for points [m].
         shapes: Of pads that are domes; on rims they are taken for balls all the same.
+        behind: How far the approaches go on behind the expected contacts, for all or (N, m) [m].
     """
     B, (N, m) = len(samples.points), p_W.shape[:2]
     surfaces = SampledSurfaces(samples)
     met = _met(surfaces, p_W.reshape(-1, 3), n_W.reshape(-1, 3), pad, shapes)
     s, theta, gap, height, dr, ddr = np.moveaxis(met, -1, 0)
     low, high = surfaces.profiles.z_range
-    hit = (gap < MET) & (s > -BEFORE) & (s < BEHIND) & (height >= low) & (height <= high)
+    end = np.broadcast_to(behind, p_W.shape[:2]).ravel()
+    hit = (gap < MET) & (s > -BEFORE) & (s < end) & (height >= low) & (height <= high)
     z = np.clip(height, low, high)
     places = (theta, z, surfaces.profiles.derivatives(z)[0], dr, ddr)
     geometry = surfaces.placed(geometry_at(*places))

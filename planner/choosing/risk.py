@@ -14,8 +14,6 @@ from estimator.information import Expected, label_log_odds
 from estimator.prior import AxisPrior
 from estimator.singular import SINGULARITIES, margins
 from estimator.surface import Geometry
-from estimator.vectors import Array
-from planner.choosing.pad_shapes import PadShapes
 from planner.choosing.prospects import Prospects, with_earlier
 from planner.choosing.worth import Worth
 
@@ -38,9 +36,7 @@ class Risk:
     chance: float
 
 
-def risks(
-    worth: Worth, theta: Array, z: Array, *, margin: float, shapes: PadShapes | None = None
-) -> tuple[Risk, ...]:
+def risks(worth: Worth, landed: Prospects, *, margin: float) -> tuple[Risk, ...]:
     """Every risk of at least 5 %, the likeliest first.
 
     Singularities count within the margin, of the triple that the touches make with the contacts
@@ -48,18 +44,15 @@ def risks(
 
     Args:
         worth: With objects that the touches were not chosen by.
-        theta, z: Their places on the believed surface, (m,).
-        shapes: Of the pads, of one placement.
+        landed: The touches of one placement on them, (B, 1, m).
     """
-    place = worth.belief.surface.at(theta[None], z[None])
-    landed = worth.landed(place, shapes)
     found = [Risk(MISSED, float(np.mean(~landed.hit.all(axis=(1, 2)))))]
     earlier = np.array([c.position for c in worth.belief.contacts]).reshape(-1, 3)
     triples = with_earlier(landed, worth.samples, earlier)
     if triples is not None:
         near = np.mean(margins(triples).values[:, 0] < margin, axis=0)
         found += [Risk(s.words, float(c)) for s, c in zip(SINGULARITIES, near, strict=True)]
-    if len(theta) > 1 and not worth.belief.contacts:
+    if landed.theta.shape[2] > 1 and not worth.belief.contacts:
         found.append(Risk(AMBIGUOUS, _ambiguous(worth, landed)))
     told = [risk for risk in found if risk.chance >= WORTH_SAYING]
     return tuple(sorted(told, key=lambda risk: -risk.chance))

@@ -16,7 +16,7 @@ from estimator.triple_scores import in_goals
 from estimator.vectors import Array, Index
 from hand_models.hand import Hand
 from planner.choosing.pad_shapes import PadShapes, pad_shapes
-from planner.choosing.prospects import Prospects, prospects, with_earlier
+from planner.choosing.prospects import BEHIND, Prospects, prospects, with_earlier
 from planner.goal import Goal
 
 DOUBTFUL_OBJECTS = 0.25  # share of the objects that may come nearer to a singularity
@@ -50,9 +50,11 @@ class Worth:
         """What is known already, in goals, (5, 5)."""
         return self._scaled(known_before(self.belief.covariance, self.noise.direction_offset))
 
-    def landed(self, place: Geometry, shapes: PadShapes | None = None) -> Prospects:
+    def landed(
+        self, place: Geometry, shapes: PadShapes | None = None, *, behind: Array | float = BEHIND
+    ) -> Prospects:
         """Touches planned at places (N, m), on each object; without shapes they are of balls."""
-        return prospects(self.samples, place.p, place.n, pad=self.pad, shapes=shapes)
+        return prospects(self.samples, place.p, place.n, pad=self.pad, shapes=shapes, behind=behind)
 
     def shapes(self, place: Geometry, fingers: Index, q: Array, R_WB: Array) -> PadShapes | None:
         """Of the hand's pads that touch at places (N, m), see `pad_shapes`."""
