@@ -54,23 +54,23 @@ def contact_information(
 
 @compiled
 def _fill_information(readings: Readings, lines: Array, out: Array) -> None:
-    one = np.zeros(1, dtype=LOCAL_WORK)[0]
+    local = np.zeros(1, dtype=LOCAL_WORK)  # a record alone does not keep its memory
     for s in range(readings.shape[0]):
         a, u = vector(lines[s], 0), vector(lines[s], 3)
         E1, E2 = across(u)
         for i in range(readings.shape[1]):
             row = readings[s, i]
             seen = seen_from(row, a, u, (0.0, 0.0, 0.0), 0.0)
-            fill_motions(seen, E1, E2, one.rows, WITH_ROTATION)
-            fit = fit_of(row, seen, 0.0, one.lean)
+            fill_motions(seen, E1, E2, local[0].rows, WITH_ROTATION)
+            fit = fit_of(row, seen, 0.0, local[0].lean)
             fill_derivatives(
-                row, seen, fit, 1.0, 0.0, one.lean,
-                one.gradient, one.fisher, one.rows, WITH_ROTATION,
+                row, seen, fit, 1.0, 0.0, local[0].lean,
+                local[0].gradient, local[0].fisher, local[0].rows, WITH_ROTATION,
             )  # fmt: skip
             for j in range(WITH_ROTATION):
                 for k in range(j + 1):
-                    out[s, i, j, k] = one.fisher[j, k]
-                    out[s, i, k, j] = one.fisher[j, k]
+                    out[s, i, j, k] = local[0].fisher[j, k]
+                    out[s, i, k, j] = local[0].fisher[j, k]
 
 
 def known_before(prior: Array, direction_offset: float) -> Array:

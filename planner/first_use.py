@@ -1,7 +1,4 @@
-"""The first plan on a machine: what it needs is compiled by two processes, in half the time of one.
-
-Half a minute on two cores; without this the first plan compiles by itself, in a minute.
-"""
+"""The first plan on a machine: two processes compile what it needs, in half the time of one."""
 
 from __future__ import annotations
 
@@ -17,6 +14,7 @@ from estimator.belief import coarse_belief, sample_objects
 from estimator.compiled import has_code
 from estimator.prior import coarse_prior
 from hand_models.hand import Hand
+from planner.choosing.pad_shapes import pad_shapes
 from planner.choosing.prospects import prospects
 from planner.hand_tools import hand_tools
 from planner.kinematics.pulling import pull
@@ -68,7 +66,11 @@ def compile_kinematics(hand: Hand, options: PlannerOptions) -> None:
     if len(candidates) == 0:
         return
     place = belief.surface.at(candidates.theta, candidates.z)
-    prospects(sample_objects(belief, 2, rng=rng), place.p, place.n, pad=tools.pad)
+    shapes = pad_shapes(
+        tools.hand, candidates.fingers, candidates.q, candidates.R_WB, place.n,
+        carried=False,
+    )  # fmt: skip
+    prospects(sample_objects(belief, 2, rng=rng), place.p, place.n, pad=tools.pad, shapes=shapes)
     names = tuple(hand.fingers[k].name for k in candidates.fingers[0])
     reach = tools.solver.solve(
         place.p[0], place.n[0], believed_solid(belief.surface), fingers=names, quick=True,

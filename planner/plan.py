@@ -18,14 +18,13 @@ from estimator.vectors import Index, frozen
 from hand_models.hand import Hand
 from planner.candidates import Candidates
 from planner.choosing.choice import Ranking, rank
-from planner.choosing.optimum import certificate, value_of
-from planner.choosing.risk import risks
 from planner.choosing.sweep import FROM, swept, with_swept
 from planner.choosing.worth import Worth
 from planner.funnel import Funnel
 from planner.goal import Goal
 from planner.hand_tools import HandTools, hand_tools
-from planner.motions.motion import Approach, approach_by_base, plan_approaches
+from planner.judging import judged
+from planner.motions.motion import Approach, approach_by_base, approach_fault, plan_approaches
 from planner.motions.retreat import Retreat
 from planner.motions.round_motion import RoundMotion, plan_round
 from planner.motions.transfer import movable_among
@@ -39,7 +38,6 @@ __all__ = ["NoPlan", "Plan", "Probe", "plan_preferred", "plan_probes"]
 
 Preference = Callable[[Candidates, Ranking], Index]
 
-RISK_OBJECTS = 40
 REFINED = 6  # of the best placements are handed to the optimiser, where none settles without
 
 
@@ -150,8 +148,7 @@ def _best_placement(
         if isinstance(made, _Made):
             funnel += _refused(count, failures)
             plan = _plan(belief.surface, sensor, candidates, ranking, i, made, funnel)
-            fingers = candidates.fingers[i]
-            return _judged(plan, fingers, worth, ranking, i, scored, options, rng)
+            return judged(plan, worth, ranking, i, scored=scored, options=options, rng=rng)
         failures[i] = made
     return funnel + _refused(count, failures)
 
@@ -160,32 +157,6 @@ def _refused(count: int, failures: dict[int, str]) -> Funnel:
     """Reasons of the candidates that were tried in vain, with their numbers."""
     reasons = Counter(failures.values())
     return tuple((f"{count} fingers: out of reach: {why}", n) for why, n in reasons.items())
-
-
-def _judged(
-    plan: Plan,
-    fingers: Index,
-    worth: Worth,
-    ranking: Ranking,
-    i: int,
-    scored: int,
-    options: PlannerOptions,
-    rng: np.random.Generator,
-) -> Plan:
-    """The plan with its risks, on objects it was not chosen by, and its certificate."""
-    others = sample_objects(worth.belief, RISK_OBJECTS, rng=rng.spawn(1)[0])
-    theta, z = np.array([(probe.place.theta, probe.place.z) for probe in plan.probes]).T
-    unseen = replace(worth, samples=others)
-    reach, place = plan.reach, worth.belief.surface.at(theta[None], z[None])
-    shapes = worth.shapes(place, fingers[None], reach.q[None], np.array(reach.X_WB.rotation)[None])
-    behind = np.array([[probe.approach.overshoot for probe in plan.probes]])
-    landed = unseen.landed(place, shapes, behind=behind)
-    found = risks(unseen, landed, margin=options.margin)
-    if not options.certify:
-        return replace(plan, risks=found)
-    choice = certificate(worth, ranking, i, scored=scored, margin=options.margin)
-    choice = replace(choice, unseen=value_of(unseen, landed))
-    return replace(plan, risks=found, choice=choice)
 
 
 def _made(
@@ -220,6 +191,9 @@ def _made(
         out = tools.ways_out(belief, replace(reach, X_WB=ways[0].bases[0]))
     else:
         ways, out = plan_approaches(solver.hand, reach), tools.ways_out(belief, reach)
+        fault = approach_fault(tools.collision, ways, options.reach.least_overshoot)
+        if fault:
+            return fault
     gentle = tuple(replace(way, force_goal=options.force_goal) for way in ways)
     if options.start is None:
         return _Made(reach, gentle, out[0], None)

@@ -71,7 +71,7 @@ if TYPE_CHECKING:
     from sim_sensor.physics.mujoco_world import MujocoWorld
 
 
-FIRST_TIME = "looking for compiled code; the first time half a minute or more ..."
+FIRST_TIME = "looking for compiled code; the first time that takes half a minute ..."
 
 
 @dataclass(frozen=True, eq=False)

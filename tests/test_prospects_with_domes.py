@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from estimator.axis import Axis
@@ -11,13 +12,15 @@ from estimator.profile import barrel, cone
 from estimator.sensors import sensor_noise
 from estimator.surface import SurfaceOfRevolution
 from estimator.vectors import Array, unit
-from hand_models import load_hand
+from hand_models import Hand, load_hand
+from hand_models.finger import Finger
 from planner.choosing.pad_shapes import PadShapes, pad_shapes
 from planner.choosing.prospects import prospects
 from planner.goal import Goal
 from planner.hand_tools import hand_tools
 from planner.options import PlannerOptions
 from planner.plan import plan_probes
+from planner.reaching.pull import pulled
 from sim_sensor.camera import coarse_view
 from sim_sensor.noise import simulated_sensor
 from sim_sensor.objects import load_object
@@ -49,20 +52,51 @@ def test_they_land_where_the_world_has_them(name):
         n = np.array([[probe.expected.normal for probe in plan.probes]])
         rows = np.array([[hand.fingers.index(hand.finger(x.finger)) for x in plan.probes]])
         R_WB = np.array(plan.reach.X_WB.rotation)[None]
-        shapes = pad_shapes(hand, rows, plan.reach.q[None], R_WB, n)
+        carried = len(plan.probes) == 1
+        shapes = pad_shapes(hand, rows, plan.reach.q[None], R_WB, n, carried=carried)
+        behind = np.array([[probe.approach.overshoot for probe in plan.probes]])
         pad = hand_tools(hand, OPTIONS.reach).pad
-        landed = prospects(one_object(surface), p, n, pad=pad, shapes=shapes)
+        landed = prospects(one_object(surface), p, n, pad=pad, shapes=shapes, behind=behind)
         world = World(surface, simulated_sensor("gel").session(rng=rng), rng=rng, hand=hand)
         for k, probe in enumerate(plan.probes):
             world.touch(probe.approach)
             truth = world.records[-1].truth
-            reaches = probe.approach.overshoot > 0.02
-            assert (truth is not None) or not (landed.hit[0, 0, k] and reaches)
+            assert truth is not None or not landed.hit[0, 0, k]
             if truth is not None and landed.hit[0, 0, k]:
                 off.append(np.linalg.norm(np.ravel(truth.p) - landed.geometry.p[0, k]))
     assert len(off) >= 6
     assert np.median(off) < 0.1e-3
-    assert max(off) < 1.5e-3  # pads turn on their way, which is reckoned with to first order
+    assert max(off) < 1e-3  # pads turn on their way, which is reckoned with to first order
+
+
+@pytest.mark.parametrize("name", ["dex3_right", "psyonic_right"])
+def test_pads_turn_as_the_pull_turns_them(name):
+    """A millimetre of the way: what the joints of a finger do, against what is told of it."""
+    hand, rng, told = load_hand(name), np.random.default_rng(2), []
+    for _ in range(30):
+        q = rng.uniform(hand.lower, hand.upper) * 0.5 + 0.25 * (hand.lower + hand.upper)
+        for row, finger in enumerate(hand.fingers):
+            X_WB = pin.SE3(pin.exp3(rng.normal(size=3)), rng.normal(size=3))
+            pose, turn = hand.at(q, X_WB), pin.exp3(0.2 * rng.normal(size=3))
+            n = -turn @ pose.pad_normals[row]
+            centre = pose.ball_centres([row], n[None])[0]
+            targets = centre + np.array([[5e-4], [-5e-4]]) * n
+            way = pulled(hand, finger, X_WB, np.repeat(q[None], 2, axis=0), targets, n)
+            if np.linalg.norm(way.centres - targets, axis=1).max() > 1e-6:
+                continue  # out of limits
+            R = [tip_rotation(hand, finger, x, X_WB) for x in way.path]
+            turned = pin.log3(R[1] @ R[0].T) / 1e-3
+            fingers, R_WB = np.array([[row]]), np.array(X_WB.rotation)[None]
+            shapes = pad_shapes(hand, fingers, q[None], R_WB, n[None, None], carried=False)
+            told.append(np.linalg.norm(shapes.spins[0, 0] - turned) / np.linalg.norm(turned))
+    assert len(told) > 10
+    assert np.quantile(told, 0.8) < 0.05
+
+
+def tip_rotation(hand: Hand, finger: Finger, q: Array, X_WB: pin.SE3) -> Array:
+    data = hand.model.createData()
+    pin.framesForwardKinematics(hand.model, data, q)
+    return np.asarray((X_WB * data.oMf[finger.tip_frame_id]).rotation)
 
 
 def scene(seed: int, count: int) -> tuple[SampledObjects, Array, Array]:
@@ -93,8 +127,8 @@ def test_balls_given_as_domes_land_like_balls():
     np.testing.assert_allclose(dome.geometry.p, ball.geometry.p, atol=1e-6)
 
 
-def test_a_dome_that_touches_touches_with_equal_normals_and_nothing_beyond():
-    """The contact's equation, and the object's points held against the dome's tangent planes."""
+def test_a_dome_that_lands_has_come_along_its_approach():
+    """Where a dome touches under a normal says where its middle is: on the line it came along."""
     rng = np.random.default_rng(1)
     samples, p, n = scene(1, 60)
     axes = 0.012 * rng.normal(size=(60, 1, 2, 3))

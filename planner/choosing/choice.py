@@ -95,7 +95,10 @@ def rank(
     """
     belief, noise, goal = worth.belief, worth.noise, worth.goal
     place = belief.surface.at(candidates.theta, candidates.z)
-    shapes = worth.shapes(place, candidates.fingers, candidates.q, candidates.R_WB)
+    shapes = worth.shapes(
+        place, candidates.fingers, candidates.q, candidates.R_WB,
+        carried=candidates.fingers.shape[1] == 1,
+    )  # fmt: skip
     landed = worth.landed(place, shapes)
     after = worth.covariances(landed)
     value, angle, offset = _expected_error(after)

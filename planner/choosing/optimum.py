@@ -36,7 +36,9 @@ class ChoiceCertificate:
     """Expected errors after the touches, in goals: 1 is a root mean square of one goal.
 
     All but `unseen` are of the objects that the touches were chosen by, which favours what was
-    chosen: the best of many thousands on a few objects is partly luck.
+    chosen: the best of many thousands on a few objects is partly luck. `unseen` alone reckons with
+    how far each finger goes on; `floor` and `optimum`, of no posture, take pads that are domes for
+    balls.
 
     Args:
         floor: What no touches anywhere have less than, extrapolated between places (`Optimum`).

@@ -31,32 +31,63 @@ class PadShapes:
     spins: Array
 
 
-def pad_shapes(hand: Hand, fingers: Index, q: Array, R_WB: Array, n_W: Array) -> PadShapes | None:
+def pad_shapes(
+    hand: Hand, fingers: Index, q: Array, R_WB: Array, n_W: Array, *, carried: bool
+) -> PadShapes | None:
     """Of fingers (N, m) in postures (N, nq) on bases (N, 3, 3) that touch under outward normals
     (N, m, 3); None where all pads are spheres.
 
-    Several fingers go along their approaches by their own joints, a single one is carried.
+    Args:
+        carried: Whether something else moves a finger along its approach, not its own joints.
     """
     if hand.has_balls:
         return None
-    pads = chains_of(hand).pads[fingers]
+    pads, placed = chains_of(hand).pads[fingers], batch_placements(hand, q)
     rows = np.arange(len(q))[:, None]
-    R_WJ = R_WB[:, None] @ batch_placements(hand, q).rotations[rows, pads["joint"]]
-    spreads = R_WJ @ pads["dome_spread"] @ np.swapaxes(R_WJ, -1, -2)
-    spins = np.zeros(n_W.shape) if fingers.shape[1] == 1 else _spins(hand, fingers, q, R_WB, n_W)
-    balls = np.asarray(pads["radius"] + pads["dome_more"])
-    return PadShapes(balls, np.ascontiguousarray(spreads), spins)
+    R_BJ = placed.rotations[rows, pads["joint"]]
+    A = R_BJ @ pads["dome_spread"] @ np.swapaxes(R_BJ, -1, -2)
+    spins = np.zeros(n_W.shape)
+    if not carried:
+        middles = placed.positions[rows, pads["joint"]]
+        middles = middles + np.einsum("nmij,nmj->nmi", R_BJ, pads["dome_centre"])
+        u = -np.einsum("nji,nmj->nmi", R_WB, n_W)
+        spins = _spins(hand, fingers, q, _Touching(u, middles, A, pads["dome_more"]))
+        spins = np.ascontiguousarray(np.einsum("nij,nmj->nmi", R_WB, spins))
+    R = R_WB[:, None]
+    spreads = np.ascontiguousarray(R @ A @ np.swapaxes(R, -1, -2))
+    return PadShapes(np.asarray(pads["radius"] + pads["dome_more"]), spreads, spins)
 
 
-def _spins(hand: Hand, fingers: Index, q: Array, R_WB: Array, n_W: Array) -> Array:
-    """The least joint velocities that take each pad's centre along -n, and the pad's turn."""
+@dataclass(frozen=True, eq=False)
+class _Touching:
+    """Pads that touch along u (N, m, 3): middles, A and rho less r, all in the hand base frame."""
+
+    u: Array
+    middles: Array
+    A: Array
+    more: Array
+
+    def balls(self) -> tuple[Array, Array]:
+        """b and db/du of `hand_models.dome`, (N, m, 3), (N, m, 3, 3)."""
+        v = np.einsum("nmij,nmj->nmi", self.A, self.u)
+        stretch = np.sqrt(np.maximum(np.sum(v * self.u, axis=-1), 1e-30))[..., None]
+        e, more = v / stretch, self.more[..., None]
+        T = (self.A - e[..., None] * e[..., None, :]) / stretch[..., None]
+        return self.middles + e + more * self.u, T + more[..., None] * np.eye(3)
+
+
+def _spins(hand: Hand, fingers: Index, q: Array, touching: _Touching) -> Array:
+    """The least joint velocities that take each pad's touching ball along u, and the pad's turn,
+    in the hand base frame: as `planner.reaching.pull` goes."""
     pads, rows = batch_pads(hand, q), np.arange(len(q))[:, None]
+    b, T = touching.balls()
+    w, u = pads.turns[rows, fingers], touching.u[..., None]
+    arm = (b - pads.centres[rows, fingers])[..., None]
+    J = pads.moves[rows, fingers] + np.cross(w, arm, axis=2) - T @ np.cross(w, u, axis=2)
     own = np.zeros((len(hand.fingers), q.shape[1]))
     for row, finger in zip(own, hand.fingers, strict=True):
         row[list(finger.q_indices)] = 1.0
-    J = pads.moves[rows, fingers] * own[fingers][..., None, :]
-    inwards = -np.einsum("nji,nmj->nmi", R_WB, n_W)
+    J = J * own[fingers][..., None, :]
     system = J @ np.swapaxes(J, -1, -2) + DAMPING * np.eye(3)
-    dq = np.einsum("nmij,nmi->nmj", J, np.linalg.solve(system, inwards[..., None])[..., 0])
-    turn = np.einsum("nmij,nmj->nmi", pads.turns[rows, fingers], dq)
-    return np.ascontiguousarray(np.einsum("nij,nmj->nmi", R_WB, turn))
+    dq = np.swapaxes(J, -1, -2) @ np.linalg.solve(system, u)
+    return np.asarray((w @ dq)[..., 0])

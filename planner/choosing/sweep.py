@@ -174,7 +174,7 @@ def _information(
     )
     R = np.repeat(R_WB, [len(reached.finger) for reached in all_reached], axis=0)
     place = worth.belief.surface.at(theta[:, None], z[:, None])
-    shapes = worth.shapes(place, finger[:, None], postures.q[posture], R)
+    shapes = worth.shapes(place, finger[:, None], postures.q[posture], R, carried=False)
     return worth.information(worth.landed(place, shapes))[:, :, 0]
 
 

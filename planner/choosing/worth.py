@@ -56,9 +56,13 @@ class Worth:
         """Touches planned at places (N, m), on each object; without shapes they are of balls."""
         return prospects(self.samples, place.p, place.n, pad=self.pad, shapes=shapes, behind=behind)
 
-    def shapes(self, place: Geometry, fingers: Index, q: Array, R_WB: Array) -> PadShapes | None:
+    def shapes(
+        self, place: Geometry, fingers: Index, q: Array, R_WB: Array, *, carried: bool
+    ) -> PadShapes | None:
         """Of the hand's pads that touch at places (N, m), see `pad_shapes`."""
-        return None if self.hand is None else pad_shapes(self.hand, fingers, q, R_WB, place.n)
+        if self.hand is None:
+            return None
+        return pad_shapes(self.hand, fingers, q, R_WB, place.n, carried=carried)
 
     def information(self, landed: Prospects) -> Array:
         """Of each touch on each object, zero where it misses, in goals, (B, N, m, 5, 5)."""

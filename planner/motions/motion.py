@@ -7,6 +7,7 @@ the arm moves the hand with its joints held (`approach_by_base`).
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +22,7 @@ from planner.reaching.straight_way import Way, stations, straight_way
 Array = NDArray[np.float64]
 
 FORCE_GOAL = 0.5  # a soft pad feels that, and hardly any object moves [N]
+_ROUNDED = 1e-6  # of lengths [m]
 ARM_STROKE = 0.03  # before and behind the contact, where the arm moves [m]
 
 
@@ -64,6 +66,23 @@ def plan_approaches(hand: Hand, reach: Reach) -> tuple[Approach, ...]:
     """
     collision = HandCollision(hand)
     return tuple(_finger_approach(hand, reach, i, collision) for i in range(len(reach.fingers)))
+
+
+def approach_fault(
+    collision: HandCollision, approaches: Iterable[Approach], least_overshoot: float
+) -> str:
+    """What is wrong with approaches of fingers, in words; empty for good ones.
+
+    Args:
+        least_overshoot: How far each has to go on behind its contact [m].
+    """
+    for way in approaches:
+        if way.overshoot < least_overshoot - _ROUNDED:
+            short = f"{1e3 * (least_overshoot - way.overshoot):.1f} mm too soon"
+            return f"{way.finger}: links meet {short} behind its contact"
+        if not all(collision.is_self_free(q) for q in way.path[: way.contact_index]):
+            return f"{way.finger}: links meet on its way in"
+    return ""
 
 
 def approach_by_base(hand: Hand, reach: Reach, *, stroke: float = ARM_STROKE) -> Approach:

@@ -38,8 +38,14 @@ class Inspection:
     faults: tuple[str, ...]
 
 
-def inspect(hand: Hand, collision: HandCollision, task: ReachTask, found: Solution) -> Inspection:
-    """Check contact, stand-off, the arm's way between them, and the fingers' overshoot."""
+def inspect(
+    hand: Hand, collision: HandCollision, task: ReachTask, found: Solution, *, by_fingers: bool
+) -> Inspection:
+    """Check contact, stand-off, the arm's way between them, and the fingers' overshoot.
+
+    Args:
+        by_fingers: Whether the fingers have stand-offs and overshoots of their own.
+    """
     options, fingers = task.options, found.fingers
     allowed = _tolerances(options)
     at = _certificate(hand, collision, task, found, 0.0)
@@ -47,14 +53,14 @@ def inspect(hand: Hand, collision: HandCollision, task: ReachTask, found: Soluti
     said.extend(_base_faults(options, found))
     wide = replace(allowed, cone=max(options.cone, options.off_contact_cone))
     by_arm = bool(np.any(found.retreat))
-    shares = _RETREATED if by_arm else (1.0,) if np.any(found.standoff) else ()
+    shares = _RETREATED if by_arm else (1.0,) if by_fingers else ()
     for share in shares:
         before = _certificate(hand, collision, task, found, share)
         wrong = faults(hand, before, found.q_standoff, fingers, wide)
         said.extend(f"at stand-off: {fault}" for fault in wrong)
     for share in (0.0, *shares):
         said.extend(_room_faults(hand, collision, options, found, share))
-    if not by_arm and np.any(found.standoff):
+    if by_fingers:
         said.extend(_way_faults(options, found))
         said.extend(_pressing_faults(hand, collision, options, found))
     return Inspection(at, before, tuple(said))
@@ -138,7 +144,7 @@ def _pressing_faults(
             q = found.q_standoff.copy()
             q[joints] = (1.0 - share) * found.q[joints] + share * found.q_overshoot[joints]
             if options.self_clearance <= 0.0 and collision.is_self_free(q):
-                continue  # much faster than the distance
+                continue  # fewer pairs than the nearest needs
             pair = collision.self_clearance(q)
             if pair.distance < options.self_clearance:
                 yield f"{name} beyond its contact: {gap_in_words(pair)}"

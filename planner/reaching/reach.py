@@ -95,7 +95,7 @@ class ReachSolver:
             refined = self._refined(task, tried, motion)
             if isinstance(refined, Reach):
                 return refined
-        return self._unreachable(task, [solution for _, solution in tried], quick=quick)
+        return self._unreachable(task, [found for _, found in tried], motion, quick=quick)
 
     def _refined(
         self, task: ReachTask, tried: list[tuple[Start, Solution]], motion: Motion
@@ -143,7 +143,7 @@ class ReachSolver:
         if motion == "arm":
             away = task.retreat
             solution = replace(solution, retreat=away, standoff=task.normals @ away)
-        return self._inspected(task, solution, tried)
+        return self._inspected(task, solution, tried, motion)
 
     def _attempt(
         self, task: ReachTask, start: Start, solver: str, motion: Motion, tried: int
@@ -157,15 +157,18 @@ class ReachSolver:
         if solution.violation < SOLVED and self._collision.is_self_free(solution.q):
             contact = Start(start.fingers, solution.q, solution.X_WB)
             solution = solve_task(self._model(fingers, motion), task, contact, solver=solver)
-        return self._inspected(task, solution, tried)
+        return self._inspected(task, solution, tried, motion)
 
-    def _inspected(self, task: ReachTask, solution: Solution, tried: int) -> Reach | Solution:
+    def _inspected(
+        self, task: ReachTask, solution: Solution, tried: int, motion: Motion
+    ) -> Reach | Solution:
         """A solution that holds as a reach, else as it is."""
         if not solution.violation < SOLVED:
             return solution
-        if np.any(solution.overshoot):
+        by_fingers = motion == "fingers"
+        if by_fingers:
             solution = straightened(self.hand, task, solution)
-        found = inspect(self.hand, self._collision, task, solution)
+        found = inspect(self.hand, self._collision, task, solution, by_fingers=by_fingers)
         if found.faults:
             return solution
         return Reach(
@@ -185,11 +188,14 @@ class ReachSolver:
             tried=tried,
         )
 
-    def _unreachable(self, task: ReachTask, failed: list[Solution], *, quick: bool) -> Unreachable:
+    def _unreachable(
+        self, task: ReachTask, failed: list[Solution], motion: Motion, *, quick: bool
+    ) -> Unreachable:
         if not failed:
             return Unreachable("no start was given and none was to be looked up", (), (), 0)
         nearest = min(failed, key=lambda solution: solution.violation)
-        found = inspect(self.hand, self._collision, task, nearest).faults
+        by_fingers = motion == "fingers"
+        found = inspect(self.hand, self._collision, task, nearest, by_fingers=by_fingers).faults
         if not nearest.violation < SOLVED and not quick:
             model = self._model(tuple(sorted(map(self._index, nearest.fingers))), "none")
             turned = cone_fault(self.hand, self._collision, model, task, nearest)

@@ -17,23 +17,29 @@ _ON_LINE = 2e-5  # of the pad's centre [m]
 
 
 def straightened(hand: Hand, task: ReachTask, found: Solution) -> Solution:
-    """A solution whose fingers stand off and press on only as far as a straight way leads there."""
+    """A solution whose fingers stand off and press on only as far as a straight way leads there,
+    on which a pad turns no farther than it may off its contact."""
+    wide = max(task.options.cone, task.options.off_contact_cone)
     ways = [
         straight_way(hand, found, i, task.points[i], task.normals[i])
         for i in range(len(found.fingers))
     ]
     if all(way.is_whole for way in ways):
         return found
+    back = [_end(way, range(way.first, way.contact + 1), wide) for way in ways]
+    on = [_end(way, range(way.last, way.contact - 1, -1), wide) for way in ways]
     return replace(
         found,
-        q_standoff=_joined(hand, found, found.q_standoff, [_end(way, way.first) for way in ways]),
-        q_overshoot=_joined(hand, found, found.q_overshoot, [_end(way, way.last) for way in ways]),
-        standoff=np.array([way.along[way.first] for way in ways]),
-        overshoot=np.array([-way.along[way.last] for way in ways]),
+        q_standoff=_joined(hand, found, found.q_standoff, back),
+        q_overshoot=_joined(hand, found, found.q_overshoot, on),
+        standoff=np.array([length for length, _ in back]),
+        overshoot=np.array([0.0 - length for length, _ in on]),
     )
 
 
-def _end(way: Way, k: int) -> tuple[float, Array]:
+def _end(way: Way, waypoints: range, wide: float) -> tuple[float, Array]:
+    """The farthest of some waypoints at which the pad is not turned too far, else the contact."""
+    k = next((k for k in waypoints if way.turned[k] <= wide), way.contact)
     return float(way.along[k]), way.path[k]
 
 

@@ -14,7 +14,7 @@ import pinocchio as pin
 
 from estimator.vectors import Array, Mask
 from hand_models.hand import Finger, Hand
-from planner.reaching.pull import pulled
+from planner.reaching.pull import Pulled, pulled
 
 SPACING = 2e-3  # between waypoints, at most [m]
 OFF_LINE = 1e-4  # of the pad's centre, where a straight way ends [m]
@@ -62,6 +62,7 @@ class Way:
         path: (K, nq).
         centres: Of the ball that touches as the pad does, (K, 3) [m].
         off_line: Their distances from the line, (K,) [m].
+        turned: Of the pad from the line, (K,) [rad].
         contact: The waypoint at distance zero.
         first, last: Waypoints between which the finger keeps to its line without a jump.
     """
@@ -70,6 +71,7 @@ class Way:
     path: Array
     centres: Array
     off_line: Array
+    turned: Array
     contact: int
     first: int
     last: int
@@ -90,29 +92,29 @@ def straight_way(hand: Hand, knots: Knots, i: int, point: Array, n: Array) -> Wa
     guess = np.repeat(knots.q_standoff[None], len(along), axis=0)
     guess[:, finger.q_indices] = [_between(joints, s, before, behind) for s in along]
     found = pulled(hand, finger, knots.X_WB, guess, line, n)
-    way = _way_of(finger, along, contact, found.path, found.centres, line)
+    way = _way_of(finger, along, contact, found, line, n)
     if way.is_whole:
         return way
     back, on = (
         pulled(hand, finger, knots.X_WB, guess[part], line[part], n, marching=True)
         for part in (slice(contact, None, -1), slice(contact, None))
     )
-    path, centres = (
-        np.concatenate([one[:0:-1], other])
-        for one, other in ((back.path, on.path), (back.centres, on.centres))
-    )
-    return _way_of(finger, along, contact, path, centres, line)
+    both = ((back.path, on.path), (back.centres, on.centres), (back.normals, on.normals))
+    joined = Pulled(*(np.concatenate([one[:0:-1], other]) for one, other in both))
+    return _way_of(finger, along, contact, joined, line, n)
 
 
 def _way_of(
-    finger: Finger, along: Array, contact: int, path: Array, centres: Array, line: Array
+    finger: Finger, along: Array, contact: int, found: Pulled, line: Array, n: Array
 ) -> Way:
-    off_line = np.linalg.norm(centres - line, axis=1)
-    jump = np.abs(np.diff(path[:, finger.q_indices], axis=0)).max(axis=1)
+    off_line = np.linalg.norm(found.centres - line, axis=1)
+    turned = np.arccos(np.clip(-found.normals @ n, -1.0, 1.0))
+    jump = np.abs(np.diff(found.path[:, finger.q_indices], axis=0)).max(axis=1)
     bad = off_line > OFF_LINE
     first = _beyond(bad[contact::-1], jump[:contact][::-1] > JUMP)
     last = _beyond(bad[contact:], jump[contact:] > JUMP)
-    return Way(along, path, centres, off_line, contact, contact - first, contact + last)
+    first, last = contact - first, contact + last
+    return Way(along, found.path, found.centres, off_line, turned, contact, first, last)
 
 
 def _beyond(bad: Mask, jumps: Mask) -> int:
