@@ -69,10 +69,9 @@ def test_they_land_where_the_world_has_them(name):
     assert max(off) < 1e-3  # pads turn on their way, which is reckoned with to first order
 
 
-@pytest.mark.parametrize("name", ["dex3_right", "psyonic_right"])
-def test_pads_turn_as_the_pull_turns_them(name):
+def test_pads_turn_as_the_pull_turns_them():
     """A millimetre of the way: what the joints of a finger do, against what is told of it."""
-    hand, rng, told = load_hand(name), np.random.default_rng(2), []
+    hand, rng, told = load_hand("dex3_right"), np.random.default_rng(2), []
     for _ in range(30):
         q = rng.uniform(hand.lower, hand.upper) * 0.5 + 0.25 * (hand.lower + hand.upper)
         for row, finger in enumerate(hand.fingers):
