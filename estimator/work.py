@@ -29,6 +29,7 @@ class Work(NamedTuple):
         right: (n,) probability that each contact is no gross error.
         local: (1,) record of one contact's `gradient`, `fisher`, `rows` and `lean`, of `chart`,
             and of `tally`: sum and number of squared residuals, gross errors left out, and all.
+            In compiled code a record is a bare pointer: its array has to outlive it.
     """
 
     gradient: Array
