@@ -69,7 +69,7 @@ def chains_of(hand: Hand) -> Chains:
         supports=_supports(hand, pads["joint"]),
         lower=np.array(hand.lower),
         upper=np.array(hand.upper),
-        domed=bool(np.any(pads["dome_spread"] != 0.0)),
+        domed=not hand.has_balls,
     )
 
 

@@ -76,12 +76,14 @@ def test_the_nearest_links_are_those_of_all_pairs(collision):
 def test_a_posture_is_free_whenever_it_is_asked(collision):
     """coal's yes or no hangs on what was asked before; in every one of these distances decide."""
     rng, free = np.random.default_rng(6), []
-    for _ in range(600):
+    for _ in range(400):
         q, _ = drawn(collision.hand, rng)
-        apart = all(distance > 0.0 for distance in collision._self_distances(q))
+        apart = bool(np.all(every_distance(collision, q) > 0.0))
         assert [collision.is_self_free(q) for _ in range(3)] == [apart] * 3
         free.append(apart)
     assert any(free)
+    if collision.hand.name == "allegro_right":
+        assert not all(free)
 
 
 def test_the_nearest_links_of_a_way_are_the_least_of_its_postures(collision):

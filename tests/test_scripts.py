@@ -62,7 +62,7 @@ def test_plan_json_has_all_motions_in_time_and_the_contacts_that_end_them(main_j
 
 
 def test_a_goal_out_of_budget_ends_with_one_and_says_why(tmp_path):
-    done = script("plan_grasp", "--goal-angle-deg", 0.01, "--budget", 6, "--out", tmp_path)
+    done = script("plan_grasp", "--goal-angle-deg", 0.01, "--budget", 3, "--out", tmp_path)
     assert done.returncode == 1, done.stderr
     result = json.loads((tmp_path / "result.json").read_text())
     assert result["goal_met"] is False

@@ -11,8 +11,7 @@ from hand_models.batch import batch_placements
 from hand_models.batch_pads import batch_pads
 from hand_models.chains import chains_of
 from hand_models.hand import Hand
-
-DAMPING = 1e-6  # [m^2], as approaches have it
+from planner.kinematics.pulling import DAMPING
 
 
 @dataclass(frozen=True, eq=False)

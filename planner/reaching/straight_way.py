@@ -7,50 +7,18 @@ be no way along it, though both are fine. So ways are walked before anything is 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
-import pinocchio as pin
 
 from estimator.vectors import Array, Mask
 from hand_models.hand import Finger, Hand
 from planner.reaching.pull import Pulled, pulled
+from planner.reaching.reach_outcome import Reach
+from planner.reaching.reach_task import Solution
 
 SPACING = 2e-3  # between waypoints, at most [m]
 OFF_LINE = 1e-4  # of the pad's centre, where a straight way ends [m]
 JUMP = 0.2  # of a joint between waypoints, likewise [rad]
-
-
-class Knots(Protocol):
-    """Where the touching fingers stand off, touch and press on."""
-
-    @property
-    def fingers(self) -> tuple[str, ...]:
-        """Their names."""
-
-    @property
-    def q(self) -> Array:
-        """At the contacts, (nq,)."""
-
-    @property
-    def q_standoff(self) -> Array:
-        """Before them, (nq,)."""
-
-    @property
-    def q_overshoot(self) -> Array:
-        """Behind them, (nq,)."""
-
-    @property
-    def X_WB(self) -> pin.SE3:
-        """The base at the contacts."""
-
-    @property
-    def standoff(self) -> Array:
-        """Lengths before them, (k,) [m]."""
-
-    @property
-    def overshoot(self) -> Array:
-        """Lengths behind them, (k,) [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +49,7 @@ class Way:
         return self.first == 0 and self.last == len(self.along) - 1
 
 
-def straight_way(hand: Hand, knots: Knots, i: int, point: Array, n: Array) -> Way:
+def straight_way(hand: Hand, knots: Solution | Reach, i: int, point: Array, n: Array) -> Way:
     """Finger i along the line through its contact: by guesses between its knots, or where those
     lead astray, from one waypoint to the next, beginning at the contact."""
     finger = hand.finger(knots.fingers[i])
